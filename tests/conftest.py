@@ -15,6 +15,7 @@ from hypothesis.internal.conjecture import providers
 from blocksim.scenario import load_scenario
 from blocksim.verification.scene import CaseScene, PaperBlock, Simulation
 from blocksim.world.build import build_world
+from tests import site
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -97,3 +98,13 @@ def shipped(request: pytest.FixtureRequest) -> Path:
     """Return every scenario file that ships, one a test."""
     path: Path = request.param
     return path
+
+
+@pytest.fixture(scope="session")
+def quick_site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a site without runs."""
+    for needed in ("mkdocs", "material", "latex2mathml"):
+        pytest.importorskip(needed)
+    folder = tmp_path_factory.mktemp("site") / "site"
+    site.build(folder, quick=True)
+    return folder

@@ -16,26 +16,16 @@ from tests import site
 PAGES = sorted(path for path in site.OWN.rglob("*.md") if "```bash" in path.read_text(encoding="utf-8"))
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Give a site without runs."""
-    for needed in ("mkdocs", "material", "latex2mathml"):
-        pytest.importorskip(needed)
-    folder = tmp_path_factory.mktemp("site") / "site"
-    site.build(folder, quick=True)
-    return folder
-
-
-def test_every_page_is_in_the_site_and_formulas_are_typeset(built: Path) -> None:
+def test_every_page_is_in_the_site_and_formulas_are_typeset(quick_site: Path) -> None:
     for page in site.repository_pages():
-        assert (built / site.place_of(page)).with_suffix(".html").is_file(), page
-    theory = (built / "theory.html").read_text(encoding="utf-8")
+        assert (quick_site / site.place_of(page)).with_suffix(".html").is_file(), page
+    theory = (quick_site / "theory.html").read_text(encoding="utf-8")
     assert theory.count("<math") > 20
     assert "$" not in re.sub(r"<script.*?</script>", "", theory, flags=re.DOTALL)
 
 
-def test_the_site_loads_nothing_from_elsewhere(built: Path) -> None:
-    for path in built.rglob("*.html"):
+def test_the_site_loads_nothing_from_elsewhere(quick_site: Path) -> None:
+    for path in quick_site.rglob("*.html"):
         loaded = re.findall(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="?(https?:[^" >]+)', path.read_text("utf-8"))
         assert [one for one in loaded if "squidfunk" not in one] == [], path
 

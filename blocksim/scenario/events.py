@@ -152,17 +152,21 @@ def actuator_names(scenario: Scenario) -> list[str]:
     return [one.name or f"actuator{number}" for number, one in enumerate(scenario.actuators, start=1)]
 
 
+def _probe_names(scenario: Scenario) -> list[str]:
+    """Return the names of the probes of the file; one without a name is called by its kind and its number from 1."""
+    return [probe.name or f"{probe.kind}{number}" for number, probe in enumerate(scenario.probes, start=1)]
+
+
 def probes_of(scenario: Scenario) -> dict[str, AnyProbe]:
-    """Return all probes by name: those of the file, without a name by kind and number from 1, and of all actuators."""
-    own = {probe.name or f"{probe.kind}{number}": probe for number, probe in enumerate(scenario.probes, start=1)}
-    recorded = {probe.actuator for probe in scenario.probes if isinstance(probe, ActuatorProbe)}
-    others = [name for name in actuator_names(scenario) if name not in recorded]
-    return own | {name: ActuatorProbe(kind="actuator", actuator=name) for name in others}
+    """Return all probes by name: those of the file, and one of every actuator by its name, unless the file has that."""
+    actuators = {name: ActuatorProbe(kind="actuator", actuator=name) for name in actuator_names(scenario)}
+    own = dict(zip(_probe_names(scenario), scenario.probes, strict=True))
+    return own | {name: probe for name, probe in actuators.items() if name not in own}
 
 
 def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find names given twice, bodies and supports that do not exist, and bodies without a joint."""
-    names = [probe.name or f"{probe.kind}{number}" for number, probe in enumerate(scenario.probes, start=1)]
+    names = _probe_names(scenario)
     for number in repetitions(names):
         yield Mistake(("probes", number, "name"), f"two probes are named {toml(names[number])}")
     jacks = actuator_names(scenario)

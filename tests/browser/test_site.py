@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests import site
-
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
@@ -15,19 +13,9 @@ pytestmark = pytest.mark.long
 SIZES = {"desktop": {"width": 1280, "height": 850}, "phone": {"width": 390, "height": 800}}
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Give a site without runs."""
-    for needed in ("mkdocs", "material", "latex2mathml"):
-        pytest.importorskip(needed)
-    folder = tmp_path_factory.mktemp("site") / "site"
-    site.build(folder, quick=True)
-    return folder
-
-
 @pytest.mark.parametrize("size", SIZES)
 def test_search_finds_pages_from_the_disk_and_nothing_is_wider_than_the_screen(
-    browser: "Browser", built: Path, size: str
+    browser: "Browser", quick_site: Path, size: str
 ) -> None:
     page = browser.new_context(viewport=SIZES[size]).new_page()  # type: ignore[arg-type]
     wrong: list[str] = []
@@ -36,7 +24,7 @@ def test_search_finds_pages_from_the_disk_and_nothing_is_wider_than_the_screen(
         "request", lambda request: None if request.url.startswith(("file:", "data:")) else wrong.append(request.url)
     )
     for name in ("theory", "reference/keys", "scenarios/index", "blocksim/verification/index", "index"):
-        page.goto((built / f"{name}.html").resolve().as_uri())
+        page.goto((quick_site / f"{name}.html").resolve().as_uri())
         assert page.evaluate("document.documentElement.scrollWidth") <= SIZES[size]["width"], name
         if "BLOCKSIM_SCREENSHOTS" in os.environ:
             folder = Path(os.environ["BLOCKSIM_SCREENSHOTS"])

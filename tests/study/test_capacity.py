@@ -68,6 +68,13 @@ def test_softening_is_where_the_force_has_fallen_to_0_8_of_the_peak() -> None:
     assert answer.warnings == ()
 
 
+def test_an_actuator_keeps_its_own_record_beside_a_probe_of_another_name() -> None:
+    probes = [{"kind": "actuator", "actuator": "jack", "name": "fine", "every": "1 ms"}]
+    result = blocksim.run(rocked({"kind": "ramp", "to": "1 mm", "rate": "5 mm/s"}, probes=probes))
+    assert {*result.probes} == {"fine", "jack"}
+    assert [one.actuator for one in blocksim.capacity(result).all] == ["jack"]
+
+
 def test_a_run_that_is_not_slow_is_warned_of() -> None:
     answer = blocksim.capacity(blocksim.run(rocked({"kind": "ramp", "to": "30 mm", "rate": "500 mm/s"})))
     assert "a lower rate is nearer to statics" in answer.warnings[0]
