@@ -99,6 +99,28 @@ def test_sweeps_and_answers_of_studies_show_their_table_and_picture(tmp_path: Pa
         assert "srcdoc=" in shown.report()._repr_html_()
 
 
+def test_sensitivity_convergence_and_calibration_show_their_table_and_picture(tmp_path: Path) -> None:
+    slide = blocksim.load(ROOT / "scenarios/slide.toml", {"contact.stiffness_scale": 0.001})
+    vary = {"friction.block_ground": {"from": 0.3, "to": 0.4}}
+    table = tmp_path / "slide.csv"
+    table.write_text("block,quantity,unit,replicate,value\nblock,x,mm,1,41\nblock,x,mm,2,43\n")
+    fitted = blocksim.calibrate(slide, vary, trials=4, members=1, experiment=table, out=tmp_path / "fitted.toml")
+    ranked = blocksim.sensitivity(slide, vary, samples=4)
+    refined = blocksim.converge(slide, studies=["step"], levels=2, out=tmp_path / "converge")
+    for shown, kind in ((fitted, "trials"), (ranked, "tornado"), (refined, "levels")):
+        html = shown._repr_html_()
+        assert html.count("<td>") >= 3
+        assert images(html) == ["png"]
+        written = blocksim.plot(shown, tmp_path / f"{kind}.png", kind=kind)
+        assert shown.plot(kind).save(tmp_path / "own.png", overwrite=True).read_bytes() == written.read_bytes()
+        assert "srcdoc=" in shown.report()._repr_html_()
+        with pytest.raises(InvalidInputError, match=f"drawn as '{kind}', not as 'strip'"):
+            shown.plot("strip")
+        with pytest.raises(InvalidInputError, match="no motion"):
+            shown.animate()
+    assert repr(fitted).startswith("<Fit of slide: best of 4 trials")
+
+
 @pytest.mark.parametrize("name", sorted(path.name for path in (ROOT / "scenarios/notebooks").glob("*.ipynb")))
 def test_a_notebook_that_ships_runs_and_shows_pictures(name: str, tmp_path: Path) -> None:
     client = pytest.importorskip("nbclient")

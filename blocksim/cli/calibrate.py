@@ -1,6 +1,6 @@
 """blocksim calibrate: fit inputs to measured repeats, so that agreement is probable under the scatter of the others."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -9,8 +9,6 @@ from blocksim.errors import ExitCode
 from blocksim.silence import silent
 from blocksim.study import calibrate, calibrate_plan
 
-COLUMNS = ("key", "prior", "fitted")
-TIED = ("key", "prior", "equally good", "written")
 TOLD_SECONDS = 2.0
 
 
@@ -55,9 +53,9 @@ def calibrate_command(
             *output.table_lines(("quantity", "measured", "median", "inside"), rows, left=1),
         ]
     return command_line.Report(
-        [*_values(found), "", *_probability(found), *nothing],
+        [*_values(found), "", *found.probability, *nothing],
         found.to_dict(),
-        _notes(found),
+        found.remarks,
         code=ExitCode.SUCCESS if found.agrees else ExitCode.OUTSIDE,
     )
 
@@ -83,41 +81,13 @@ def _trial_lines() -> Callable[[calibrate_plan.Trial, calibrate_plan.Trial, int]
 
 def _values(found: calibrate.Fit) -> list[str]:
     """Return the fitted values or, where trials tie, the ranges of those that are equally good."""
-    rows = [(prior, str(found.best.values[prior.key])) for prior in found.plan.priors]
+    told = found.overview()
+    lines = output.table_lines(told.heads, told.texts(), left=1)
     if len(found.ties) < 2:
-        return output.table_lines(
-            COLUMNS, [[prior.key, prior.range_of(prior.low, prior.high), value] for prior, value in rows], left=1
-        )
-    tied = [
-        [prior.key, prior.range_of(prior.low, prior.high), prior.range_of(*found.equally_good(prior)), value]
-        for prior, value in rows
-    ]
+        return lines
     return [
-        *output.table_lines(TIED, tied, left=1),
+        *lines,
         "",
         f"{len(found.ties)} of {found.trials} trials tie: the measurement does not decide between their values;",
         "the file holds one of them. More measurements or --samples may tell them apart",
     ]
-
-
-def _probability(found: calibrate.Fit) -> list[str]:
-    score, tried = found.score, found.best.score
-    if found.plan.scatter is None:
-        verdict = "inside all ranges" if score.inside else f"not inside all ranges ({score.miss:.3g} off)"
-        return [f"one run, without input scatter: {verdict}"]
-    low, high = score.interval
-    return [
-        f"P(inside all ranges) = {score.share_inside:.3f}, 95 % interval {low:.3f} to {high:.3f} (Clopper-Pearson)",
-        f"of {score.members} fresh random samples; search estimate {tried.share_inside:.3f} ({tried.members} samples)",
-    ]
-
-
-def _notes(found: calibrate.Fit) -> Iterator[str]:
-    for prior in found.plan.priors:
-        value = found.best.values[prior.key]
-        if prior.lies_at_bound(value):
-            yield f"warning: {prior.key} = {value} lies at a bound of its prior; a wider one might fit better"
-    failed = found.score.failed
-    if failed:
-        yield f"{failed} of {found.score.members} fresh samples failed or cannot be simulated; they count as outside"
-    yield f"written: {found.path}"

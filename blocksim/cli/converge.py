@@ -1,7 +1,7 @@
 """blocksim converge: refine time step, stiffness, spacing and tolerance until the run-out converges."""
 
 import shlex
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +13,7 @@ from blocksim.errors import ExitCode
 from blocksim.options import Option, Replace
 from blocksim.scenario.spelling import list_names
 from blocksim.simulation import files, schemes
-from blocksim.study import converge, pictures, rows
+from blocksim.study import converge, rows
 from blocksim.view import studies as drawings, style
 
 MOST_BLOCKS = 3
@@ -58,20 +58,18 @@ def converge_command(
                 files.refuse_foreign(path, overwrite=overwrite)
         prepare.announce_compilation(schemes.kernels_of(ready), quiet=screen.silent)
         result = converge.converge(ready, replace(options, jobs=jobs, on_run=tell))
-        drawn = path if picture and pictures.draw_convergence(result, ready, path, paper) else None
+        drawn = path if picture and result.panels() else None
+        if drawn is not None:
+            result.draw(drawn, f"{result.name}: distance from the finest level", paper)
     lines = []
     for study in result.studies:
         lines += [f"{study.title}: {study.key}", *_table(result, study), *_verdict(study), ""]
     lines += [*result.notes, ""] if result.notes else []
     lines += _recommendation(result, source)
-    studies = [
-        {**asdict(study), "recommended": None if study.recommendation is None else study.recommendation.value}
-        for study in result.studies
-    ]
     shown = None if drawn is None else str(drawn)
     return command_line.Report(
         lines,
-        {**asdict(result), "studies": studies, "converged": result.converged, "picture": shown},
+        {**result.to_dict(), "picture": shown},
         [] if drawn is None else [f"picture: {drawn}"],
         code=ExitCode.NUMERICAL_FAILURE if result.failed else ExitCode.SUCCESS,
     )

@@ -71,13 +71,5 @@ def _table(found: Sensitivity, one: Indices) -> list[str]:
 
 
 def _notes(found: Sensitivity, out: Path | None) -> Iterator[str]:
-    yield from (f"{column}: {meaning}" for column, (_, meaning) in found.method.columns.items())
-    still = [one.name for one in found.outputs if not one.numbers]
-    if still:
-        yield f"does not vary: {', '.join(still)}"
-    if found.failed:
-        yield (
-            f"{found.failed} of {found.runs} runs failed; {found.left_out} of {found.blocks} "
-            f"{found.method.sample_word} are left out for it. The first: {found.first_problem}"
-        )
+    yield from found.remarks
     yield f"{found.runs} runs" + (f"; table: {out}" if out is not None else "")

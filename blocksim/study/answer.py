@@ -18,7 +18,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.notebook import Shown
-from blocksim.scenario import input_files, load_stored
+from blocksim.scenario import Scenario, input_files, load_stored
 from blocksim.study.sweep_folder import FolderKind, write_answer
 from blocksim.view.report.subjects import StudyPage
 from blocksim.view.style import OWN, Paper
@@ -74,12 +74,50 @@ def number_text(number: float, digits: int) -> str:
     return text[1:] if text.startswith("-") and not text.strip("-0.") else text
 
 
-class Answer(Shown, BaseModel, frozen=True):
+class StudyResult(Shown):
+    """What a study has come to: a table with remarks, and a picture of one kind."""
+
+    picture: ClassVar[str]  # name of its kind
+    caption: ClassVar[str]  # of the table in a report
+
+    def overview(self) -> Overview:
+        """Return what it is for people."""
+        raise NotImplementedError
+
+    def draw(self, path: Path, title: str, paper: Paper) -> None:
+        """Draw the picture. Raises InvalidInputError where there is nothing to draw."""
+        raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        """Return title, table, remarks and picture, for notebooks."""
+        told = self.overview()
+        head = "".join(f"<th>{escape(one)}</th>" for one in told.heads)
+        lines = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in told.texts())
+        notes = "".join(f"<p>{escape(line)}</p>" for line in (*told.lines, *told.notes))
+        return f"<p>{escape(told.title)}</p><table><tr>{head}</tr>{lines}</table>{notes}{self._picture()}"
+
+
+class UnstoredResult(StudyResult):
+    """A result of a study that has no folder of its own: it is drawn from memory."""
+
+    what: ClassVar[str]
+    folder: ClassVar[None] = None
+    scenario: Scenario  # that was studied
+
+    @property
+    def name(self) -> str:
+        """The name of the scenario."""
+        return self.scenario.name
+
+    def __repr__(self) -> str:
+        """Return the title."""
+        return f"<{type(self).__name__} of {self.overview().title}>"
+
+
+class Answer(StudyResult, BaseModel, frozen=True):
     """What a study has come to; its fields are those of NAME.json, in their order."""
 
     files: ClassVar[FolderKind]
-    picture: ClassVar[str]  # name of its kind
-    caption: ClassVar[str]  # of the table in a report
     takes_table: ClassVar[bool] = False  # of others in its picture
     folder: Path = Field(default=Path(), exclude=True)
     run: int = Field(default=0, exclude=True)  # runs of this call; the others were known
@@ -114,22 +152,6 @@ class Answer(Shown, BaseModel, frozen=True):
         import pandas as pd
 
         return pd.DataFrame(list(self.cells), columns=list(self.heads))
-
-    def overview(self) -> Overview:
-        """Return what it is for people."""
-        raise NotImplementedError
-
-    def _repr_html_(self) -> str:
-        """Return title, table, remarks and picture, for notebooks."""
-        told = self.overview()
-        head = "".join(f"<th>{escape(one)}</th>" for one in told.heads)
-        lines = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in told.texts())
-        notes = "".join(f"<p>{escape(line)}</p>" for line in (*told.lines, *told.notes))
-        return f"<p>{escape(told.title)}</p><table><tr>{head}</tr>{lines}</table>{notes}{self._picture()}"
-
-    def draw(self, path: Path, title: str, paper: Paper) -> None:
-        """Draw the picture of an answer that was read. Raises InvalidInputError where there is nothing to draw."""
-        raise NotImplementedError
 
 
 def without_cases(data: Any) -> Any:
@@ -176,19 +198,44 @@ def draw_study(folder: Path, study: Study, options: "PlotOptions") -> Path:
     scenario = load_stored(folder / kind.files.plan)
     path = options.picture(f"{scenario.name}_{kind.picture}.png")
     answer = kind.read(folder).model_copy(update={"beside": published})
-    answer.draw(path, scenario.description or scenario.name, options.paper)
+    answer.draw(path, title_of(scenario), options.paper)
     return path
+
+
+def draw_result(result: UnstoredResult, options: "PlotOptions") -> Path:
+    """Draw a result in memory; return the picture's path (default: NAME_KIND.png).
+
+    Raises InvalidInputError for another kind of picture, an unknown format, options that mean nothing for it and where
+    there is nothing to draw, OutputExistsError, OutputError.
+    """
+    if options.kind not in {None, result.picture}:
+        raise InvalidInputError(f"{result.what} is drawn as {result.picture!r}, not as {options.kind!r}")
+    if options.experiment is not None:
+        raise InvalidInputError(f"{options.experiment}: {result.what} is drawn beside the table of its scenario only")
+    options.refuse(None, f"this is {result.what}")
+    path = options.picture(f"{result.name}_{result.picture}.png")
+    result.draw(path, title_of(result.scenario), options.paper)
+    return path
+
+
+def title_of(scenario: Scenario) -> str:
+    """Return the title of a picture of a scenario."""
+    return scenario.description or scenario.name
 
 
 def study_page(folder: Path, study: Study) -> StudyPage:
     """Return a study as a report shows it. Raises InputMissingError or InvalidInputError where it cannot be read."""
     answer = study.answer.read(folder)
-    scenario, table = load_stored(folder / answer.files.plan), answer.overview()
-    picture, problems = None, []
+    return page_of(answer, load_stored(folder / answer.files.plan))
+
+
+def page_of(answer: StudyResult, scenario: Scenario) -> StudyPage:
+    """Return a result as a report shows it."""
+    table, picture, problems = answer.overview(), None, []
     with TemporaryDirectory() as place:
         path = Path(place) / "picture.png"
         try:
-            answer.draw(path, scenario.description or scenario.name, OWN)
+            answer.draw(path, title_of(scenario), OWN)
             picture = path.read_bytes()
         except BlocksimError as error:
             problems = [str(error)]

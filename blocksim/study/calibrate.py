@@ -8,18 +8,22 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import tomli_w
 
 from blocksim.errors import BlocksimError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.extras import load_module
 from blocksim.options import takes
-from blocksim.scenario import Document, Source, document_of, scenario_hash, scenario_to_toml
+from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash, scenario_to_toml
 from blocksim.scenario.document import locate
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.overrides import KeyPath, follow, format_key, with_value
 from blocksim.simulation import files, interruption, schemes
 from blocksim.study import calibrate_plan
+from blocksim.study.answer import Overview, UnstoredResult
 from blocksim.study.executors.ensemble import run_members
+from blocksim.view import studies
+from blocksim.view.style import Paper
 
 TABLES: tuple[KeyPath, ...] = (("experiment", "table"), ("motion", "table"), ("sweep", "table"))
 NOTE = "calibrated, see [provenance]"
@@ -118,10 +122,14 @@ def toml_value(value: object) -> str:
 TAKEN = "{}: already exists; --overwrite replaces it, --out FILE writes elsewhere"
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, repr=False)
+class Fit(UnstoredResult):
     """What a calibration found; `score` is of fresh samples, drawn independently, that no trial has seen."""
 
+    what = "a calibration"
+    picture = "trials"
+    caption = "Fitted values"
+    scenario: Scenario
     plan: calibrate_plan.CalibrationPlan
     best: calibrate_plan.Trial
     score: calibrate_plan.Score
@@ -129,6 +137,7 @@ class Fit:
     path: Path
     hits: tuple[calibrate_plan.Hit, ...]  # of the fresh members, a quantity each
     ties: tuple[calibrate_plan.Trial, ...] = ()  # all that are as good as the best, the best among them
+    tried: tuple[calibrate_plan.Trial, ...] = ()
 
     @property
     def agrees(self) -> bool:
@@ -181,6 +190,72 @@ class Fit:
             ],
         }
 
+    @property
+    def probability(self) -> list[str]:
+        """How probable agreement is with the fitted values."""
+        score, tried = self.score, self.best.score
+        if self.plan.scatter is None:
+            verdict = "inside all ranges" if score.inside else f"not inside all ranges ({score.miss:.3g} off)"
+            return [f"one run, without input scatter: {verdict}"]
+        low, high = score.interval
+        estimate = f"search estimate {tried.share_inside:.3f} ({tried.members} samples)"
+        return [
+            f"P(inside all ranges) = {score.share_inside:.3f}, 95 % interval {low:.3f} to {high:.3f} (Clopper-Pearson)",
+            f"of {score.members} fresh random samples; {estimate}",
+        ]
+
+    @property
+    def remarks(self) -> list[str]:
+        """Values at a bound of their prior, failures, and where the scenario is."""
+        values = [(prior, self.best.values[prior.key]) for prior in self.plan.priors]
+        lines = [
+            f"warning: {prior.key} = {value} lies at a bound of its prior; a wider one might fit better"
+            for prior, value in values
+            if prior.lies_at_bound(value)
+        ]
+        failed = self.score.failed
+        if failed:
+            count = f"{failed} of {self.score.members} fresh samples"
+            lines.append(f"{count} failed or cannot be simulated; they count as outside")
+        return [*lines, f"written: {self.path}"]
+
+    def overview(self) -> Overview:
+        """Return the fitted values and, where trials tie, the ranges of those that are equally good."""
+        heads = ("key", "prior", "equally good", "written") if len(self.ties) > 1 else ("key", "prior", "fitted")
+        rows = []
+        for prior in self.plan.priors:
+            tied = (prior.range_of(*self.equally_good(prior)),) if len(self.ties) > 1 else ()
+            rows.append((prior.key, prior.range_of(prior.low, prior.high), *tied, str(self.best.values[prior.key])))
+        found = "" if self.agrees else ", nothing inside all ranges"
+        return Overview(
+            f"{self.name}: best of {self.trials} trials{found}",
+            heads,
+            rows,
+            lines=self.probability,
+            notes=self.remarks,
+            summary=[("trials", str(self.trials)), ("P(inside all ranges)", f"{self.score.share_inside:.3f}")],
+        )
+
+    def draw(self, path: Path, title: str, paper: Paper) -> None:
+        """Draw how good every trial is over each fitted key.
+
+        Raises InvalidInputError for an unknown format or too small a page, OutputError.
+        """
+        some = any(trial.score.inside for trial in self.tried)
+        label = "share inside all ranges" if some else "distance from the ranges (0 to 1)"
+        scores = [trial.score.share_inside if some else trial.score.miss for trial in self.tried]
+        best = np.array([trial in self.ties for trial in self.tried])
+        panels = [
+            studies.TrialPanel(
+                f"{prior.key} ({prior.unit})" if prior.unit else prior.key,
+                np.array([prior.number(trial.values[prior.key]) for trial in self.tried]),
+                (prior.low, prior.high),
+                is_log=prior.log,
+            )
+            for prior in self.plan.priors
+        ]
+        studies.draw_trials(panels, np.array(scores), best, label, path, title=title, paper=paper)
+
 
 @takes(calibrate_plan.CalibrateOptions)
 def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit:
@@ -217,12 +292,13 @@ def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit
     except OSError as error:
         raise OutputExistsError(f"{path.parent}: cannot be created: {error.strerror}") from error
     kept = path if path.exists() and not overwrite else None
-    best, ties = _searched(plan, journal, options, kept)
+    best, ties, tried = _searched(plan, journal, options, kept)
     count = 1 if plan.scatter is None else options.fresh_members
     fresh = calibrate_plan.members_of(plan.scatter, best.values, count, plan.seed, calibrate_plan.FRESH)
     members = list(run_members(plan.bare, fresh))
     score = calibrate_plan.score_of(members, plan.ranges)
-    fit = Fit(plan, best, score, options.trials, path, calibrate_plan.hits_of(members, plan.ranges), ties)
+    hits = calibrate_plan.hits_of(members, plan.ranges)
+    fit = Fit(plan.base, plan, best, score, options.trials, path, hits, ties, tried)
     note = f"one of {len(ties)} equally good, see [provenance]" if len(fit.ties) > 1 else NOTE
     which = f"one of {len(ties)} equally good trials: " if len(fit.ties) > 1 else ""
     shown = ", ".join(f"{key} = {value}" for key, value in best.values.items())
@@ -237,8 +313,8 @@ def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit
 
 def _searched(
     plan: calibrate_plan.CalibrationPlan, journal: Path, options: calibrate_plan.CalibrateOptions, kept: Path | None
-) -> tuple[calibrate_plan.Trial, tuple[calibrate_plan.Trial, ...]]:
-    """Return the best trial, the first of equally good ones, and all that tie with it, the best among them."""
+) -> tuple[calibrate_plan.Trial, tuple[calibrate_plan.Trial, ...], tuple[calibrate_plan.Trial, ...]]:
+    """Return the best trial, the first of equally good ones, all that tie with it, the best among them, and all."""
     tried: list[calibrate_plan.Trial] = []
     trials = options.trials
 
@@ -266,7 +342,7 @@ def _searched(
     # ranges members are inside only steers the search: no measurement prefers it
     inside, miss = best.score.inside, best.score.miss
     ties = (one for one in tried if one.score.inside == inside and (inside > 0 or one.score.miss == miss))
-    return best, tuple(ties)
+    return best, tuple(ties), tuple(tried)
 
 
 def _provenance(fit: Fit) -> dict[str, str]:

@@ -17,7 +17,7 @@ two outcomes is no error of discretisation: it has no order, and that it shrinks
 import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing, nullcontext, suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
 from math import inf, isfinite, log, log10, nan, sqrt
@@ -27,13 +27,18 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.analysis.experiment import load_table
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.options import Option, takes
 from blocksim.scenario import Scenario, Source, load_scenario, place_bodies, start
 from blocksim.silence import silent
 from blocksim.simulation import files, interruption, provenance, results, schemes
+from blocksim.study import pictures
+from blocksim.study.answer import Overview, UnstoredResult
 from blocksim.study.executors import RunSetting, Task, processes
 from blocksim.study.rows import FINISHED, Row, check_experiment
+from blocksim.view import studies as drawings
+from blocksim.view.style import Paper
 from blocksim.world.nonsmooth import velocity_tolerance
 from blocksim.world.step import safety_of
 
@@ -140,11 +145,20 @@ class Recommendation:
     to_finest_mm: float
 
 
-@dataclass(frozen=True)
-class Convergence:
+NO_CHANGE = Recommendation({}, nan, nan, nan)
+
+
+FEWEST_SHOWN = 2  # levels, to show a distance
+
+
+@dataclass(frozen=True, repr=False)
+class Convergence(UnstoredResult):
     """All studies of one scenario; `recommended` is None where there is nothing to change, or nothing to rely on."""
 
-    name: str
+    what = "a study of convergence"
+    picture = "levels"
+    caption = "Levels of refinement"
+    scenario: Scenario
     blocks: tuple[str, ...]
     tolerance_mm: float
     studies: tuple[RefinementStudy, ...]
@@ -160,6 +174,81 @@ class Convergence:
     def converged(self) -> bool:
         """Return True if every study has converged."""
         return all(study.verdict is ConvergenceVerdict.CONVERGED for study in self.studies)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values for JSON."""
+        studies = [
+            {**asdict(one), "recommended": None if one.recommendation is None else one.recommendation.value}
+            for one in self.studies
+        ]
+        return {
+            "name": self.name,
+            "blocks": self.blocks,
+            "tolerance_mm": self.tolerance_mm,
+            "studies": studies,
+            "notes": self.notes,
+            "recommended": None if self.recommended is None else asdict(self.recommended),
+            "converged": self.converged,
+        }
+
+    def overview(self) -> Overview:
+        """Return the levels of all studies, from coarse to fine, with the verdicts."""
+        rows: list[tuple[str | float, ...]] = []
+        for one in self.studies:
+            own = [f"{level.value:g}{' (own)' if level.is_own else ''}" for level in one.levels]
+            rows += [
+                (one.key, value, level.status, level.change_mm, level.order, level.to_finest_mm, level.seconds)
+                for value, level in zip(own, one.levels, strict=True)
+            ]
+        verdicts = [(one.title, str(one.verdict)) for one in self.studies]
+        settings = ", ".join(f"{key} = {value:g}" for key, value in (self.recommended or NO_CHANGE).settings.items())
+        return Overview(
+            f"{self.name}: {', '.join(': '.join(one) for one in verdicts)} (tolerance {self.tolerance_mm:g} mm)",
+            ("setting", "value", "status", "change mm", "order", "to finest mm", "seconds"),
+            rows,
+            left=3,
+            digits=3,
+            lines=[f"recommended: {settings}"] if settings else [],
+            notes=self.notes,
+            summary=[*verdicts, *([("recommended", settings)] if settings else [])],
+        )
+
+    def panels(self) -> list[drawings.LevelPanel]:
+        """Return a panel for each study with enough levels."""
+        found = []
+        for study in self.studies:
+            levels = [level for level in study.levels if level.x_mm]
+            if len(levels) < FEWEST_SHOWN:
+                continue
+            x, unit = np.array([level.x_mm for level in levels]), pictures.unit_of(self.scenario, study.key)
+            found.append(
+                drawings.LevelPanel(
+                    title=study.title,
+                    key=f"{study.key} ({unit})" if unit else study.key,
+                    verdict=study.verdict.value,
+                    values=np.array([level.value for level in levels]),
+                    blocks=self.blocks,
+                    off_mm=np.abs(x - x[-1]),
+                    largest_off_mm=np.array([level.to_finest_mm for level in levels]),
+                    tolerance_mm=self.tolerance_mm,
+                    own=study.own.value,
+                    recommended=None if study.recommendation is None else study.recommendation.value,
+                )
+            )
+        return found
+
+    def draw(self, path: Path, title: str, paper: Paper) -> None:
+        """Draw the distances from the finest levels.
+
+        Raises InvalidInputError for an unknown format, too small a page and where no study has two levels, OutputError.
+        """
+        panels = self.panels()
+        if not panels:
+            raise InvalidInputError(f"{self.name}: fewer than {FEWEST_SHOWN} levels have finished; nothing to draw")
+        table = None if self.scenario.experiment is None else load_table(self.scenario.experiment.table)
+        rows = [] if table is None else [row for row in table.summaries() if row.quantity == "x"]
+        widths = {row.block: row.maximum - row.minimum for row in rows}  # of the measured ranges
+        drawings.draw_levels(panels, path, title=title, measured=widths, paper=paper)
 
 
 class Coordinates:
@@ -327,7 +416,7 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
         singles = [{key: level.value} for level, key in sorted(changed, key=lambda pair: pair[0].seconds)]
         candidates = (runs.joint(settings, found) for settings in (together, *singles) if settings)
         recommended = next((joint for joint in candidates if joint.to_finest_mm <= tolerance_mm), None)
-    return Convergence(scenario.name, runs.coordinates.blocks, tolerance_mm, found, notes, recommended)
+    return Convergence(scenario, runs.coordinates.blocks, tolerance_mm, found, notes, recommended)
 
 
 class LevelRuns:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,10 +11,12 @@ from blocksim import __version__
 from blocksim.analysis.compare import Comparison
 from blocksim.analysis.metrics import Judgement
 from blocksim.errors import InvalidInputError
+from blocksim.notebook import Shown
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation import Result
 from blocksim.simulation.instruments import FrameRows, frames_from_rows
-from blocksim.study import pictures, report, run_folder
+from blocksim.study import answer, pictures, report, run_folder
+from blocksim.study.answer import UnstoredResult
 from blocksim.study.capacity import CapacityAnswer
 from blocksim.view import style
 from blocksim.view.display import AnimationDisplay, PageDisplay, PictureDisplay
@@ -34,33 +36,32 @@ class Unwritten(pictures.PlotOptions):
         return Path(default)
 
 
+class PictureSource(NamedTuple):
+    """What is drawn of a result of a class, and the options that go with it."""
+
+    of: Callable[[Any], Any]
+    options: Callable[[Any], dict[str, Any]]
+
+
+SUBJECTS: dict[type[Shown], PictureSource] = {
+    CapacityAnswer: PictureSource(lambda shown: shown.run, lambda _: {"kind": CAPACITY}),
+    Comparison: PictureSource(lambda shown: shown.run, lambda shown: {"experiment": Path(shown.source)}),
+    Judgement: PictureSource(lambda shown: Path(shown.sweep).parent, lambda shown: {"experiment": shown.source}),
+}
+"""Results that are drawn as something else; a new one is a line here, or a kind of `StudyResult`."""
+
+
 def picture_of(shown: Any, *, kind: str | None = None, **options: Any) -> PictureDisplay:
     """Return a picture of a scenario, a run, a sweep, the answer of a study or a comparison.
 
     Without `kind` it is the final state of a run, the start of a scenario, and what suits a sweep. Raises as
     `blocksim.plot`.
     """
-    subject = _subject(shown)
-    if isinstance(shown, Judgement):
-        options = {"experiment": shown.source, **options}
-    elif isinstance(shown, CapacityAnswer):
-        kind = kind or CAPACITY
-    elif isinstance(shown, Comparison):
-        options = {"experiment": Path(shown.source), **options}
-    if isinstance(subject, Result | Scenario):
-        kind = kind or FINAL
-    asked = Unwritten(kind=kind, **options)
+    preset = SUBJECTS[type(shown)].options(shown) if type(shown) in SUBJECTS else {}
+    asked = Unwritten(**{**preset, **options, **({} if kind is None else {"kind": kind})})
     with style.keep_figures() as kept:
-        if isinstance(subject, Scenario):
-            if kind not in {FINAL, MOTION}:
-                raise InvalidInputError(f"{kind}: a scenario is drawn as {FINAL} or {MOTION}; run it for others")
-            _draw_scenario(subject, asked)
-        elif not isinstance(subject, Result):
-            pictures.draw(subject, asked)
-        elif kind == MOTION:
-            pictures.draw_motion(lambda: subject.scenario, asked)
-        else:
-            pictures.draw_run(_stored(subject), asked)
+        subject = _subject(shown)
+        next(draw for one, draw in DRAWN.items() if isinstance(subject, one))(subject, asked)
     return PictureDisplay(kept[-1], asked.paper.dots)
 
 
@@ -69,6 +70,8 @@ def animation_of(shown: Any, **options: Any) -> AnimationDisplay:
     run = _subject(shown)
     if isinstance(run, Scenario):
         raise InvalidInputError(f"{run.name}: run the scenario first; its result is animated")
+    if isinstance(run, UnstoredResult):
+        raise InvalidInputError(f"{run.name}: {run.what} has no motion; animate a run")
     stored = _stored(run) if isinstance(run, Result) else lambda: run_folder.read_run(run)
     asked = pictures.AnimateOptions(**options)
     return AnimationDisplay(lambda path: pictures.animate_run(stored(), path, asked), lambda: picture_of(shown))
@@ -82,6 +85,8 @@ def page_of(shown: Any, *, experiment: Path | str | None = None) -> PageDisplay:
     table = None if experiment is None else Path(experiment)
     if isinstance(subject, Result):
         return PageDisplay(report.page_of_result(subject, table))
+    if isinstance(subject, UnstoredResult):
+        return PageDisplay(report.page_of_study(subject))
     parts, problems = report.subjects_of([subject], table)
     if problems:
         raise InvalidInputError("\n".join(problems))
@@ -90,15 +95,10 @@ def page_of(shown: Any, *, experiment: Path | str | None = None) -> PageDisplay:
 
 def _subject(shown: Any) -> Any:
     """Return what is drawn of something: a scenario, a result, or the folder of a sweep or a study."""
-    if isinstance(shown, Comparison):
-        if shown.run is None:
-            raise InvalidInputError("this comparison is of a table; nothing to draw")
-        return shown.run
-    if isinstance(shown, Judgement):
-        return Path(shown.sweep).parent
-    if isinstance(shown, CapacityAnswer):
-        return shown.run
-    return shown if isinstance(shown, Result | Scenario) else run_folder.folder_of(shown)
+    subject = SUBJECTS[type(shown)].of(shown) if type(shown) in SUBJECTS else shown
+    if subject is None:
+        raise InvalidInputError("this comparison is of a table; nothing to draw")
+    return subject if isinstance(subject, Result | Scenario | UnstoredResult) else run_folder.folder_of(subject)
 
 
 def _stored(run: Result) -> Callable[[], run_folder.StoredRun]:
@@ -107,13 +107,32 @@ def _stored(run: Result) -> Callable[[], run_folder.StoredRun]:
     )
 
 
+def _draw_result(run: Result, options: pictures.PlotOptions) -> None:
+    """Draw a run, by default its end."""
+    options = replace(options, kind=options.kind or FINAL)
+    if options.kind == MOTION:
+        pictures.draw_motion(lambda: run.scenario, options)
+    else:
+        pictures.draw_run(_stored(run), options)
+
+
 def _draw_scenario(scenario: Scenario, options: pictures.PlotOptions) -> None:
     """Draw the motion of the supports, or everything as it is placed."""
     if options.kind == MOTION:
         pictures.draw_motion(lambda: scenario, options)
         return
+    if options.kind not in {None, FINAL}:
+        raise InvalidInputError(f"{options.kind}: a scenario is drawn as {FINAL} or {MOTION}; run it for others")
     systems = (block_system(place_bodies(scenario)), *others_of(scenario))
     states = tuple(np.stack([one.elements.start] * len(SIZES)) for one in systems)
     frames = frames_from_rows(systems, 0.0, FrameRows(np.arange(len(SIZES)), states, SIZES, ()))
     start = run_folder.StoredRun(Path(), scenario, frames, (), "", dict)
-    pictures.draw_run(lambda: start, replace(options, times=(0.0,)))
+    pictures.draw_run(lambda: start, replace(options, kind=FINAL, times=(0.0,)))
+
+
+DRAWN: dict[type, Callable[[Any, pictures.PlotOptions], object]] = {
+    Scenario: _draw_scenario,
+    Result: _draw_result,
+    UnstoredResult: answer.draw_result,
+    Path: pictures.draw,
+}

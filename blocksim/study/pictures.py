@@ -1,6 +1,6 @@
 """What `plot` draws: runs, sweeps, studies and tables of sensitivities, read back from where they lie."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
@@ -38,8 +38,6 @@ from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from blocksim.study.converge import Convergence
 
 
 LARGEST = 1e30  # of inputs (SI) and of places (mm) that are drawn
@@ -175,6 +173,11 @@ def read_indices(path: Path) -> tuple[list[studies.Bars], tuple[str, str]]:
         input_files.raise_problems(table.problems)
     if not rows:
         raise InvalidInputError(f"{path}: no result varies; nothing to draw")
+    return bars_of(rows, shown), shown.labels
+
+
+def bars_of(rows: Sequence[Mapping[str, object]], shown: IndexColumns) -> list[studies.Bars]:
+    """Return the bars of every result, of rows with output, unit, key and the columns of a method."""
     panels = []
     for output in dict.fromkeys(str(row["output"]) for row in rows):
         own = [row for row in rows if row["output"] == output]
@@ -184,7 +187,7 @@ def read_indices(path: Path) -> tuple[list[studies.Bars], tuple[str, str]]:
         keys = tuple(str(row["key"]) for row in own)
         value, half_width = columns[shown.value], columns[shown.half_width]
         panels.append(studies.Bars(f"{output}{bracket}", keys, value, half_width, columns.get(shown.part)))
-    return panels, shown.labels
+    return panels
 
 
 def _read(cell: input_files.TableCell, problems: list[Problem]) -> str | float:
@@ -428,45 +431,6 @@ def animate(place: run_folder.Place, options: AnimateOptions) -> Path:
     return draw_film(run_folder.folder_of(place), options)[0]
 
 
-FEWEST_LEVELS = 2  # to show a distance
-
-
-def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, paper: style.Paper = style.OWN) -> bool:
-    """Draw a panel for each study with enough levels; return whether there was one.
-
-    Raises InvalidInputError for an unknown picture format or too small a page, and OutputError when the file cannot be
-    written.
-    """
-    panels = []
-    for study in result.studies:
-        levels = [level for level in study.levels if level.x_mm]
-        if len(levels) < FEWEST_LEVELS:
-            continue
-        x, unit = np.array([level.x_mm for level in levels]), unit_of(scenario, study.key)
-        panels.append(
-            studies.LevelPanel(
-                title=study.title,
-                key=f"{study.key} ({unit})" if unit else study.key,
-                verdict=study.verdict.value,
-                values=np.array([level.value for level in levels]),
-                blocks=result.blocks,
-                off_mm=np.abs(x - x[-1]),
-                largest_off_mm=np.array([level.to_finest_mm for level in levels]),
-                tolerance_mm=result.tolerance_mm,
-                own=study.own.value,
-                recommended=None if study.recommendation is None else study.recommendation.value,
-            )
-        )
-    if panels:
-        table = None if scenario.experiment is None else load_table(scenario.experiment.table)
-        rows = [] if table is None else [row for row in table.summaries() if row.quantity == "x"]
-        widths = {row.block: row.maximum - row.minimum for row in rows}  # of the measured ranges
-        studies.draw_levels(
-            panels, path, title=f"{result.name}: distance from the finest level", measured=widths, paper=paper
-        )
-    return bool(panels)
-
-
 def _draw_sweep(folder: Path, options: PlotOptions) -> Path:
     """Draw a sweep, by default as the kind that suits it; return the picture's path (default: NAME.png).
 
@@ -499,6 +463,8 @@ def plot(place: run_folder.Place, options: PlotOptions) -> Path:
     and a result that was not kept, InputMissingError, OutputExistsError for a file of others unless `overwrite`,
     OutputError.
     """
+    if isinstance(place, answer.UnstoredResult):
+        return answer.draw_result(place, options)
     return draw(run_folder.folder_of(place), options)[0]
 
 

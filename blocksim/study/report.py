@@ -68,6 +68,12 @@ def page_of_result(result: Result, experiment: Path | None = None) -> str:
     return page.page_text(shown, title=title_of(shown), version=__version__)
 
 
+def page_of_study(result: answer.UnstoredResult) -> str:
+    """Return the text of the page of a result of a study in memory."""
+    shown = [parts.study_subject("part-1", answer.page_of(result, result.scenario), "")]
+    return page.page_text(shown, title=title_of(shown), version=__version__)
+
+
 def subjects_of(
     places: Sequence[Path],
     experiment: Path | None = None,

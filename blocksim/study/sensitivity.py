@@ -4,6 +4,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
@@ -13,12 +14,15 @@ from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.extras import load_module
 from blocksim.options import Option, takes
-from blocksim.scenario import Source, document_of
+from blocksim.scenario import Scenario, Source, document_of
 from blocksim.scenario.models.study import Normal, Variation
 from blocksim.silence import silent
 from blocksim.simulation import schemes, trajectory
-from blocksim.study import plan as plans, rows
+from blocksim.study import pictures, plan as plans, rows
+from blocksim.study.answer import Overview, UnstoredResult
 from blocksim.study.executors.ensemble import run_members
+from blocksim.view import studies
+from blocksim.view.style import Paper
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -187,10 +191,14 @@ class Indices:
     numbers: Mapping[str, tuple[float, ...]]
 
 
-@dataclass(frozen=True)
-class Sensitivity:
+@dataclass(frozen=True, repr=False)
+class Sensitivity(UnstoredResult):
     """Indices of all outputs; `left_out` of `blocks` blocks of the design had failed runs in them."""
 
+    what = "a study of sensitivity"
+    picture = pictures.TORNADO
+    caption = "Sensitivity indices"
+    scenario: Scenario
     method: Method
     keys: tuple[str, ...]
     outputs: tuple[Indices, ...]
@@ -232,6 +240,49 @@ class Sensitivity:
             ],
             "indices": self.records(),
         }
+
+    @property
+    def remarks(self) -> list[str]:
+        """What the columns mean, which outputs do not vary, and what failed."""
+        lines = [f"{column}: {meaning}" for column, (_, meaning) in self.method.columns.items()]
+        still = [one.name for one in self.outputs if not one.numbers]
+        if still:
+            lines.append(f"does not vary: {', '.join(still)}")
+        if self.failed:
+            lines.append(
+                f"{self.failed} of {self.runs} runs failed; {self.left_out} of {self.blocks} "
+                f"{self.method.sample_word} are left out for it. The first: {self.first_problem}"
+            )
+        return lines
+
+    def overview(self) -> Overview:
+        """Return the indices, the most important key of every output first."""
+        rows: list[tuple[str | float, ...]] = []
+        for output in self.outputs:
+            columns = list(output.numbers.values())
+            order = sorted(range(len(self.keys) if columns else 0), key=lambda i: -abs(columns[0][i]))
+            rows += [(output.name, output.unit, self.keys[i], *(column[i] for column in columns)) for i in order]
+        design = f"{self.blocks} {self.method.sample_word}"
+        return Overview(
+            f"{self.name}: {self.method.name}, {design}, {self.runs} runs",
+            ("output", "unit", "key", *self.method.columns),
+            rows,
+            left=3,
+            digits=3,
+            notes=self.remarks,
+            summary=[("method", f"{self.method.name}, {design}"), ("runs", str(self.runs))],
+        )
+
+    def draw(self, path: Path, title: str, paper: Paper) -> None:
+        """Draw bars of the indices.
+
+        Raises InvalidInputError for an unknown format, too small a page and where no output varies, OutputError.
+        """
+        rows = self.records()
+        if not rows:
+            raise InvalidInputError(f"{self.name}: no result varies; nothing to draw")
+        shown = next(one for one in pictures.METHODS if one.value in self.method.columns)
+        studies.draw_tornado(pictures.bars_of(rows, shown), shown.labels, path, title=title, paper=paper)
 
 
 @dataclass(frozen=True)
@@ -313,6 +364,7 @@ def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
     kept = np.repeat(whole, size)
     finals = [member.final for member, is_kept in zip(members, kept, strict=True) if is_kept and member.final]
     return Sensitivity(
+        scenario=base,
         method=method,
         keys=tuple(plan.vary),
         outputs=tuple(indices_of(output, points[kept], method, options.seed) for output in outputs_of(finals, table)),

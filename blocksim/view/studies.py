@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.view import run_data, style, time_panels
 from blocksim.view.sweeps.data import short_names
@@ -330,6 +331,60 @@ def span_of_bars(panel: Bars) -> tuple[float, float]:
     low = float(min(ends.min(), 0.0, np.min(panel.values - reach)))
     high = float(max(ends.max(), 0.0, np.max(panel.values + reach)))
     return low - 0.02 * largest, high + 0.02 * largest
+
+
+TRIAL_PANEL, TRIAL_LEAST = (2.4, 2.0), (1.3, 0.8)  # inches, of a panel, and on a page whose size was asked for
+TRIAL_SIDES, TRIAL_GAPS = (0.65, 0.2, 0.11, 0.45), (0.55, 0.55)  # inches, around panels and between them
+MOST_ACROSS, TICKS = 3, 4
+TRIED: dict[str, Any] = {"color": style.FAINT_INK, "marker": "o", "markersize": 3.0, "linestyle": "none"}
+BEST: dict[str, Any] = {"color": SIMULATED["color"], "marker": "o", "markersize": 5.0, "linestyle": "none"}
+
+
+@dataclass(frozen=True, eq=False)
+class TrialPanel:
+    """One fitted key with its unit: its values in n trials, and the ends of its prior."""
+
+    key: str
+    values: run_data.Floats  # (n,)
+    ends: tuple[float, float]
+    is_log: bool = False
+
+
+def draw_trials(
+    panels: Sequence[TrialPanel],
+    scores: run_data.Floats,
+    best: NDArray[np.bool_],
+    label: str,
+    path: Path | str,
+    title: str | None = None,
+    paper: style.Paper = style.OWN,
+) -> None:
+    """Draw the score of every trial over each key, the best trials in colour, and write PNG, SVG or PDF.
+
+    `scores` and `best` have an entry a trial, `label` names the scores. Raises InvalidInputError for an unknown
+    picture format or too small a page, and OutputError when the file cannot be written.
+    """
+    path, rest = style.picture_path(path), len(panels)
+    counts = [min(MOST_ACROSS, rest - start) for start in range(0, rest, MOST_ACROSS)]
+    names = [(TRIED, "trials"), (BEST, "best" if np.count_nonzero(best) == 1 else "equally good")]
+    handles = [style.legend_entry(name, **look) for look, name in names]
+    more: dict[str, Any] = {"title": title, "handles": handles, "columns": len(handles)}
+    with style.open_panels(paper, counts, TRIAL_PANEL, TRIAL_LEAST, TRIAL_SIDES, TRIAL_GAPS, **more) as opened:
+        figure, drawn = opened
+        for panel, axes in zip(panels, [one for row in drawn for one in row], strict=True):
+            for look, chosen in ((TRIED, ~best), (BEST, best)):
+                axes.plot(panel.values[chosen], scores[chosen], clip_on=False, zorder=3, **look)
+            axes.set_xscale("log" if panel.is_log else "linear")
+            axes.set_xlim(*panel.ends)
+            axes.set_ylim(0.0, 1.1 * float(scores.max()) or 1.0)
+            style.number_axis(axes.xaxis, TICKS, is_log=panel.is_log)
+            style.number_axis(axes.yaxis, MOST_NUMBERS)
+            axes.spines[["right", "top"]].set_visible(False)
+            width, height = (style.POINTS_PER_INCH * one for one in style.size_of(axes))
+            axes.set_xlabel(style.cut_to(panel.key, width, style.FONT_SIZE), labelpad=2.0)
+            if axes in [row[0] for row in drawn]:
+                axes.set_ylabel(style.cut_to(label, height, style.FONT_SIZE))
+        style.save_figure(figure, path)
 
 
 LEVEL_SIDES, LEVEL_GAP = (0.72, 1.05, 0.52, 0.46), 0.35  # inches, around panels and between them
