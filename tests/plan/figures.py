@@ -47,6 +47,11 @@ class Module:
         """The syntax tree."""
         return ast.parse(self.text)
 
+    @cached_property
+    def nodes(self) -> tuple[ast.AST, ...]:
+        """All nodes of the tree."""
+        return tuple(ast.walk(self.tree))
+
     @property
     def folder(self) -> str:
         """The folder below the package."""
@@ -60,7 +65,7 @@ class Module:
     @property
     def functions(self) -> list[Function]:
         """All functions and methods."""
-        return [node for node in ast.walk(self.tree) if isinstance(node, Function)]
+        return [node for node in self.nodes if isinstance(node, Function)]
 
 
 def read_package(root: Path = ROOT) -> list[Module]:
@@ -82,7 +87,7 @@ def _spans(nodes: Iterator[ast.stmt]) -> int:
 
 
 def _docstrings(module: Module) -> Iterator[ast.stmt]:
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         if isinstance(node, Function | ast.ClassDef | ast.Module) and node.body:
             first = node.body[0]
             if (
@@ -95,7 +100,7 @@ def _docstrings(module: Module) -> Iterator[ast.stmt]:
 
 def import_share(modules: list[Module]) -> float:
     """Return the share of lines that import."""
-    imports = (node for one in modules for node in ast.walk(one.tree) if isinstance(node, ast.Import | ast.ImportFrom))
+    imports = (node for one in modules for node in one.nodes if isinstance(node, ast.Import | ast.ImportFrom))
     return _spans(imports) / sum(one.lines for one in modules)
 
 
@@ -113,7 +118,7 @@ def single_statement_share(modules: list[Module]) -> float:
 def imported_modules(module: Module, names: set[str]) -> set[str]:
     """Return the modules of the package that a module imports, those of names in them too."""
     found = set()
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -148,7 +153,7 @@ def called_once(modules: list[Module]) -> list[str]:
     calls = Counter(
         getattr(node.func, "id", getattr(node.func, "attr", ""))
         for one in modules
-        for node in ast.walk(one.tree)
+        for node in one.nodes
         if isinstance(node, ast.Call)
     )
     names = [node.name for one in modules for node in one.tree.body if isinstance(node, Function)]
@@ -161,7 +166,7 @@ def classes_of_one_name(modules: list[Module]) -> list[str]:
         node.name
         for one in modules
         if not one.path.startswith("kernels/")
-        for node in ast.walk(one.tree)
+        for node in one.nodes
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
     )
     return sorted(name for name, count in counts.items() if count > 1)
@@ -171,7 +176,7 @@ def repeated_lists(modules: list[Module]) -> list[str]:
     """Return the functions and dataclasses that have more than eight parameters or fields in common with another."""
     lists: dict[str, set[str]] = {}
     for one in modules:
-        for node in ast.walk(one.tree):
+        for node in one.nodes:
             if isinstance(node, Function):
                 arguments = (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
                 lists[f"{one.path}:{node.name}"] = {argument.arg for argument in arguments}

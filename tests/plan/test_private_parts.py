@@ -15,7 +15,7 @@ MODULES = {one.path: one for one in read_package()}
 
 def parts_of(module: Module) -> Iterator[str]:
     """Yield what a module imports of numba and llvmlite."""
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name.startswith(("numba.", "llvmlite")))
         elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in {"numba", "llvmlite"}:
@@ -32,7 +32,7 @@ def test_every_private_part_is_listed_with_its_purpose() -> None:
     rows = [line for line in (compiler.__doc__ or "").splitlines() if line.startswith("| numba.") or "| llvm" in line]
     calls = [
         [one.value for one in node.args[:2] if isinstance(one, ast.Constant)]
-        for node in ast.walk(MODULES[HOME].tree)
+        for node in MODULES[HOME].nodes
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "private"
     ]
     assert len(calls) > 20

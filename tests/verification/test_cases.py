@@ -43,7 +43,7 @@ HERTZ = "Hertz–Mindlin"  # its law is tested in tests/kernels, its cases are f
 SLOW = {  # seconds; V9, V11 and the ledgers of tests/simulation are there always
     "linear": {"V10", "V12", "V15", "V18", "V23"},
     HERTZ: {case.id for case in CASES} - {"V25"},
-    RIGID: {"V18", "V23"},
+    RIGID: {"V18", "V23", "V26"},
 }
 COLUMNS = [
     pytest.param(case, head, id=f"{case.id}-{head}", marks=LONG if case.id in slow else ())
@@ -112,7 +112,7 @@ RECTANGLES = (
     [
         pytest.param(case, SETTINGS[RIGID], id=f"{case.id}-{RIGID}", marks=LONG if is_long else ())
         for case in cases_of(RIGID)
-        for is_long in [case.id in {"V3", "V4", "V9", "V10", "V13", "V15", "V17", "V18", "V23"}]
+        for is_long in [case.id in {"V3", "V4", "V9", "V10", "V13", "V15", "V17", "V18", "V23", "V26"}]
     ]
     + [
         pytest.param(case, Setting(quick=True), id=f"{case.id}-linear", marks=LONG if case.id == "V3" else ())

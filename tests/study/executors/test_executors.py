@@ -140,6 +140,7 @@ def test_unreachable_scheduler_is_reported_before_anything_is_written(
     quick: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """So is a missing package."""
+    monkeypatch.setattr("blocksim.study.executors.dask.PATIENCE", 0.2)
     for told in (r"no Dask scheduler answers at tcp://127\.0\.0\.1:1 ", r"pip install 'blocksim\[cluster\]'"):
         with pytest.raises(UnavailableError, match=told):
             sweep(quick, {KINETIC: [0.1]}, out=tmp_path / "out", scheduler="tcp://127.0.0.1:1")
