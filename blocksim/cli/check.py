@@ -214,6 +214,11 @@ def _some(head: str, lines: Sequence[str]) -> Iterator[str]:
         yield f"{'':<{HEAD}}and {len(lines) - MOST_LINES} more {head}s"
 
 
+def _pressed(load: loads.Pressure) -> str:
+    """Return what a pressure acts on, in words."""
+    return f"{load.body}, {load.face} face" if load.body else f"structure {load.structure}, {load.face} side"
+
+
 def _load(load: loads.AnyLoad) -> str:
     """Return what a load is, in words."""
     match load:
@@ -232,9 +237,9 @@ def _load(load: loads.AnyLoad) -> str:
         case loads.Horizontal():
             text = f"{load.magnitude:g} g on all free blocks, horizontally"
         case loads.Pressure(magnitude=None):
-            text = f"water to {load.water_level or 0.0:g} m on {load.body}, {load.face} face"
+            text = f"water to {load.water_level or 0.0:g} m on {_pressed(load)}"
         case _:
-            text = f"{_in_unit(load.magnitude or 0.0, 'Pa')} on {load.body}, {load.face} face"
+            text = f"{_in_unit(load.magnitude or 0.0, 'Pa')} on {_pressed(load)}"
     match load.history:
         case loads.Constant():
             return text

@@ -9,7 +9,7 @@ from typing import get_args
 
 from pydantic import ValidationError
 
-from blocksim.scenario import geometry, mistakes, overrides, start, units
+from blocksim.scenario import geometry, mistakes, overrides, placement, start, units
 from blocksim.scenario.models import base, contact, study, timeline
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.structures import polygons
@@ -156,7 +156,7 @@ def implausible_values(scenario: Scenario) -> list[str]:
                 key = overrides.format_key(("structures", number))
                 warnings.append(f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"')
     warnings += _friction_angles(scenario)
-    for soil in start.soil_tables(scenario):
+    for soil in placement.soil_tables(scenario):
         extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
         counts = geometry.count_across(soil.corners, soil.spacing)
         for way, extent, count in zip(("width", "height"), extents, counts, strict=True):

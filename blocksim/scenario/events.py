@@ -2,18 +2,21 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from blocksim.scenario import overrides, spelling
 from blocksim.scenario.geometry import Corner, dot, edges_of
 from blocksim.scenario.mistakes import Mistake, repetitions, unknown
-from blocksim.scenario.models.loads import Gravity
+from blocksim.scenario.models.loads import AnyLoad, Gravity
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.timeline import ActuatorProbe, AnyProbe, Event, ForceProbe, JointProbe, PointProbe
 from blocksim.scenario.placement import TOLERANCE, PlacedBody
 from blocksim.scenario.units import toml
+
+if TYPE_CHECKING:
+    from blocksim.scenario.models.actuators import Actuator
 
 MAX_EVENTS = 1000
 GROUPS = ("remove", "fix", "free")
@@ -85,7 +88,8 @@ def _wrong_moments_and_names(scenario: Scenario, known: Sequence[str]) -> Iterat
 
 def _wrong_unloads(scenario: Scenario) -> Iterator[Mistake]:
     """Find loads to end that do not exist, cannot end, or end twice."""
-    loads = {load.name: load for load in scenario.loads if load.name is not None}
+    loads: dict[str, AnyLoad | Actuator] = {load.name: load for load in scenario.loads if load.name is not None}
+    loads |= dict(zip(actuator_names(scenario), scenario.actuators, strict=True))
     ends: dict[str, int] = {}
     for number in in_order(scenario.events):
         for place, name in enumerate(scenario.events[number].unload):

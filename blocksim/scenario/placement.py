@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import geometry, overrides
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.structures.base import PolygonStructure, Pose, Structure
 
 LENGTH_WITHOUT_BLOCKS = 0.1  # m: can be seen beside soil
@@ -238,6 +239,11 @@ class PlacedSegment(NamedTuple):
     def length(self) -> float:
         """Length in m."""
         return math.hypot(self.x1 - self.x0, self.y1 - self.y0)
+
+
+def soil_tables(scenario: Scenario) -> list[SoilTable]:
+    """Return the soils of a scenario."""
+    return [table for table in scenario.systems.get("soils", ()) if isinstance(table, SoilTable)]
 
 
 def place_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:

@@ -1,31 +1,26 @@
 """Impossible starts although every value is valid by itself: sizes, overlaps, loads, soils."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain, islice, pairwise
 from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import events, geometry, laws, overlap, overrides, placement, resolution
+from blocksim.scenario import events, geometry, laws, open_faces, overlap, overrides, placement, resolution
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repetitions, unknown
 from blocksim.scenario.models.actuators import Actuator
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS, SUPPORT
-from blocksim.scenario.models.loads import NORMALS, Face, Force, Gravity, OnBody, Pressure
+from blocksim.scenario.models.loads import Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.placement import PlacedBody
 from blocksim.scenario.structures import base, polygons
-from blocksim.scenario.units import ANGLE, Quantity, toml
+from blocksim.scenario.units import toml
 
 MAX_LOADS = 1000
-NO_FACE = (0.0, 0.0), (0.0, 0.0), (0.0, 1.0)
-STRIP = 1e-3
-"""Thickness of the strip before a face in which nothing else may lie, in smaller sides of the body."""
-AS_NEAR = 1e-6
-"""Difference of cosines up to which two faces point into a direction as much as one another."""
 
 
 def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
@@ -42,10 +37,12 @@ def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mi
     for number in [number for number, load in enumerate(loads) if isinstance(load, Gravity)][1:]:
         yield Mistake(("loads", number), "gravity turns already; one load of this kind is allowed")
     for number, load in enumerate(loads):
-        if isinstance(load, OnBody):
+        if isinstance(load, OnBody) and load.body is not None:
             yield from unknown(("loads", number, "body"), "body", by_name, load.body)
             if load.body in by_name:
-                yield from _on_body(scenario, number, load, by_name)
+                yield from _on_body(scenario, number, load, by_name[load.body], bodies)
+        elif isinstance(load, Pressure):
+            yield from _on_structure(scenario, ("loads", number), load)
     for number, actuator in enumerate(scenario.actuators):
         yield from unknown(("actuators", number, "body"), "body", by_name, actuator.body)
         if actuator.body in by_name:
@@ -56,19 +53,30 @@ def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mi
             yield Mistake(("start", "hold", number), f"body {toml(name)} is fixed and cannot be released")
 
 
-def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str, PlacedBody]) -> Iterator[Mistake]:
+def _on_structure(scenario: Scenario, path: overrides.KeyPath, load: Pressure) -> Iterator[Mistake]:
+    """Find a structure that is not there, or has nothing free and open on that side."""
+    count = len(scenario.structures)
+    if (load.structure or 0) > count:
+        have = f"the scenario has {count}" if count else "the scenario has none"
+        yield Mistake((*path, "structure"), f"there is no structure {load.structure}; {have}")
+    elif not open_faces.faces_under(scenario, load):
+        yield Mistake((*path, "face"), f"nothing of structure {load.structure} is free and open on that side")
+
+
+def _on_body(
+    scenario: Scenario, number: int, load: OnBody, body: PlacedBody, bodies: Sequence[PlacedBody]
+) -> Iterator[Mistake]:
     path = ("loads", number)
-    body = bodies[load.body]
     if body.fixed:
         yield Mistake((*path, "body"), f"body {toml(load.body)} is fixed; a load has no effect on it")
     elif isinstance(load, Force):
         yield from _at_point(path, load, body)
-    elif isinstance(load, Pressure) and face_of(body.corners, load.face) is None:
+    elif isinstance(load, Pressure) and open_faces.face_of(body.corners, load.face) is None:
         numbers = f"1 to {len(body.corners)}, counter-clockwise from its first corner"
         message = f"no face, or no single one, of body {toml(load.body)} is that; its faces have the numbers {numbers}"
         yield Mistake((*path, "face"), message)
     elif isinstance(load, Pressure):
-        other = next(_covers(scenario, load, body, [*bodies.values()]), None)
+        other = next(_covers(scenario, load, body, bodies), None)
         if other is not None:
             message = f"this face of body {toml(load.body)} is covered by {other}; pressure needs a free face"
             yield Mistake((*path, "face"), message)
@@ -79,34 +87,15 @@ def _at_point(path: overrides.KeyPath, acting: Force | Actuator, body: PlacedBod
     if body.fixed:
         what = "driven" if body.driven else "fixed"
         yield Mistake((*path, "body"), f"body {toml(body.name)} is {what}; nothing else moves it")
-    elif not geometry.holds(body.corners, acting.point, 0.5 * STRIP * body.least_width):
+    elif not geometry.holds(body.corners, acting.point, 0.5 * open_faces.STRIP * body.least_width):
         (left, bottom), (right, top) = ((1e3 * x, 1e3 * y) for x, y in geometry.box_of(body.corners))
         extent = f"which extends from ({left:g}, {bottom:g}) to ({right:g}, {top:g}) mm along its own axes"
         yield Mistake((*path, "point"), f"the point lies outside of body {toml(body.name)}, {extent}")
 
 
-def face_of(corners: Sequence[geometry.Corner], face: Face) -> geometry.Edge | None:
-    """Return the ends of a face (m, in the body), the left or else lower one first, and its outward normal.
-
-    `corners` are counter-clockwise. None where it does not exist, or two faces point that way as much as one another.
-    """
-    edges = [*geometry.edges_of(corners)]
-    if isinstance(face, int):
-        edges = edges[face - 1 : face]
-    else:
-        angle = 0.0 if face in NORMALS else Quantity(ANGLE).read(face)
-        way = NORMALS.get(face, (math.cos(angle), math.sin(angle)))
-        most = max(geometry.dot(way, normal) for _, _, normal in edges)
-        edges = [edge for edge in edges if geometry.dot(way, edge[2]) >= most - AS_NEAR]
-    if len(edges) != 1:
-        return None
-    begin, end, normal = edges[0]
-    return min(begin, end), max(begin, end), normal
-
-
 def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequence[PlacedBody]) -> Iterator[str]:
     """Yield what lies against a part of a face that is more than a line: what reaches into half of the strip."""
-    strip, margin = strip_before(body, load.face), 0.5 * STRIP * body.least_width
+    strip, margin = open_faces.strip_before(body, load.face), 0.5 * open_faces.STRIP * body.least_width
     if scenario.ground.profile is None and float(overlap.Outlines.of([strip]).bottom[0]) < -margin:
         yield "the ground"
     segments = placement.place_segments(scenario)
@@ -121,24 +110,9 @@ def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequen
                 yield f"body {toml(other.name)}"
 
 
-def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
-    """Return the strip before a face of a body, a little shorter than the face at both ends."""
-    thickness = STRIP * body.least_width
-    (x0, y0), (x1, y1), (nx, ny) = face_of(body.corners, face) or NO_FACE
-    x, y = 0.5 * (x0 + x1 + nx * thickness), 0.5 * (y0 + y1 + ny * thickness)
-    size_x, angle = math.hypot(x1 - x0, y1 - y0) - 2.0 * thickness, body.angle + math.atan2(y1 - y0, x1 - x0)
-    x, y = body.ground_point(x, y)
-    return body._replace(size_x=size_x, size_y=thickness, x=x, y=y, angle=angle, outline=())
-
-
 MOST_MEETINGS = 20
 MOST_NAMES = 3
 PLACES_ON_A_WALL = 33
-
-
-def soil_tables(scenario: Scenario) -> list[SoilTable]:
-    """Return the soils of a scenario."""
-    return [table for table in scenario.systems.get("soils", ()) if isinstance(table, SoilTable)]
 
 
 def particle_places(soil: SoilTable, scenario: Scenario) -> NDArray[np.float64]:
@@ -178,7 +152,7 @@ def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[st
         more = f" and {len(blocks) - MOST_NAMES} more" if len(blocks) > MOST_NAMES else ""
         which = f"blocks {', '.join(blocks[:MOST_NAMES])}" if len(blocks) > 1 else f"block {blocks[0]}"
         found.append(f'{which}{more}; kind = "fill" leaves blocks out')
-    for other in soil_tables(scenario):
+    for other in placement.soil_tables(scenario):
         if other is soil:
             break
         if other.name == soil.name:

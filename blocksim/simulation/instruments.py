@@ -244,7 +244,7 @@ def joint_sampler(bodies: tuple[int, int], placed: tuple[PlacedBody, PlacedBody]
 
 
 def actuator_sampler(number: int) -> Sampler:
-    """Return what samples an actuator, given its number among all loads."""
+    """Return what samples an actuator, given its number among all loads, from the end where negative."""
 
     def sample(moment: Snapshot) -> Values:
         world = moment.scene.world
@@ -359,7 +359,8 @@ def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float
                 assert joint is not None  # noqa: S101 - the scenario was checked
                 sampler = joint_sampler((first, second), (placed[first], placed[second]), joint)
             case ActuatorProbe():
-                sampler = actuator_sampler(len(scenario.loads) + events.actuator_names(scenario).index(probe.actuator))
+                names = events.actuator_names(scenario)
+                sampler = actuator_sampler(names.index(probe.actuator) - len(names))
         every = scenario.output.every if probe.every is None else probe.every
         period = 1.0 if every == STEP else max(float(every) / time_step, 1.0)
         columns = dict.fromkeys(ledger, "J") if probe.kind == ENERGY else COLUMNS[probe.kind]

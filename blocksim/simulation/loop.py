@@ -16,7 +16,8 @@ import numpy as np
 
 from blocksim.errors import ExitCode
 from blocksim.kernels.common import arrays
-from blocksim.scenario import PlacedBody, Scenario, events
+from blocksim.kernels.common.loads import value_at
+from blocksim.scenario import PlacedBody, Scenario, events, open_faces
 from blocksim.scenario.models.timeline import Event
 from blocksim.simulation import balance, checkpoint, instruments, results, schemes
 
@@ -38,7 +39,8 @@ class Timeline:
         self.events, self.placed, self.step = scenario.events, placed, step
         self.names = {body.name: number for number, body in enumerate(placed)}
         self.walls = events.wall_names(scenario)
-        self.loads = [load.name for load in scenario.loads]
+        self.loads = [one.load.name for one in open_faces.acting_loads(scenario, self.names)]
+        self.loads += events.actuator_names(scenario)
         self.records: tuple[results.EventRecord, ...] = ()
         order = events.in_order(self.events)
         timed = ((self.events[number].at, number) for number in order)
@@ -101,11 +103,13 @@ class Timeline:
             world = fix_body(world, self.names[name])
         for name in event.free:
             world = free_body(world, self.names[name], self.placed[self.names[name]])
-        for name in event.unload:
-            load, clock, controls = world.loads[self.loads.index(name)], world.clock[0], world.controls[0]
-            last = int(load.last_piece) - 1
-            piece = world.load_pieces[last]
-            piece.start, piece.value = clock.steps * controls.step, 0.0  # zero from now on
+        for load in [world.loads[number] for number, name in enumerate(self.loads) if name in event.unload]:
+            controls = world.controls[0]
+            now, last = world.clock[0].steps * controls.step, int(load.last_piece) - 1
+            piece, value = world.load_pieces[last], 0.0
+            if load.kind == arrays.LOAD_ACTUATOR:  # it lets go, and its head stops
+                value, load.stiffness, load.damping = value_at(world, load, now), 0.0, 0.0
+            piece.start, piece.value = now, value  # from now on
             piece.rate = piece.acceleration = 0.0
             load.first_piece = last
             controls.loads_end = world.load_pieces["start"][world.loads["last_piece"] - 1].max()

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from blocksim.analysis.experiment import load_table
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.options import Option, takes
-from blocksim.scenario import Scenario, Source, load_scenario, place_bodies, start
+from blocksim.scenario import Scenario, Source, load_scenario, place_bodies, placement
 from blocksim.silence import silent
 from blocksim.simulation import files, interruption, provenance, results, schemes
 from blocksim.study import pictures
@@ -489,7 +489,7 @@ class LevelRuns:
     def notes(self, studies: Iterable[str] | None) -> tuple[str, ...]:
         """Say what was not studied, and what the numbers cannot mean."""
         notes, scenario = [], self.scenario
-        if start.soil_tables(scenario):
+        if placement.soil_tables(scenario):
             more = "; --study spacing halves soils.spacing, eight times the cost a level" if studies is None else ""
             notes.append(f"distances are those of blocks, not of soil{more}")
         elif studies is None and scenario.contact.model not in PARTICLE_MODELS:
@@ -538,7 +538,7 @@ def _possible(scenario: Scenario) -> list[Refinement]:
     if scenario.contact.model in PARTICLE_MODELS:
         key = "contact.particle_spacing"
         chosen.append(Refinement(SPACING, "particle spacing", key, contact.particle_spacing, 0.5, 1))
-    soils = start.soil_tables(scenario)
+    soils = placement.soil_tables(scenario)
     if soils:  # twice the spacing may be too coarse to be admissible
         chosen.append(Refinement(SPACING, "spacing of soil", SOIL_SPACING, soils[0].spacing, 0.5, 0))
     return chosen

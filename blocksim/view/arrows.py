@@ -8,12 +8,11 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.models.loads import Force, Gravity, Horizontal, Moment, Pressure
-from blocksim.scenario.start import NO_FACE, face_of
 from blocksim.simulation.trajectory import Contacts, Frames, Rows, forces_on_a
 from blocksim.view import style
 from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices, Support, rotate_points
 from blocksim.view.scene import Canvas
-from blocksim.world.systems.blocks import are_removed, distinct
+from blocksim.world.systems.blocks import are_removed
 
 USUAL = 0.9  # share of all recorded forces that are no larger than the one the scale is made for
 USUAL_LENGTH = 0.6  # of the mean side of the blocks: length of the arrow of that force
@@ -272,8 +271,7 @@ def _loads_and_speeds(poses: _Poses, support: Support) -> Iterator[Arrows]:
             yield poses.arrows(FORCE, one.body, arms, (load.magnitude * factor)[..., None] * ways)
         elif isinstance(load, Pressure):
             is_water = load.water_level is not None
-            corners = distinct(poses.corners[one.body]).tolist()
-            begin, end, normal = map(np.array, face_of(corners, load.face) or NO_FACE)
+            begin, end, normal = map(np.array, one.edge)
             along = np.linspace(0.0, 1.0, DEEP) if is_water else (np.arange(UNIFORM) + 0.5) / UNIFORM
             arms = poses.to_scene(one.body, begin + np.outer(along, end - begin))
             up = np.array([np.sin(support.tilt), np.cos(support.tilt)])

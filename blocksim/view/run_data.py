@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import PlacedSegment, Scenario, events, place_bodies, placement
-from blocksim.scenario.models.loads import AnyLoad, OnBody, Stretch, stretches_of
+from blocksim.scenario import PlacedSegment, Scenario, events, geometry, open_faces, place_bodies, placement
+from blocksim.scenario.models.loads import AnyLoad, Stretch, stretches_of
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.simulation.results import EventRecord
 from blocksim.simulation.trajectory import Frames
@@ -26,11 +26,12 @@ PRINTED = 0.000501  # s; half of the last digit of a printed time, and round-off
 LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
 
 
-class ActingLoad(NamedTuple):
-    """A load, the number of its body (-1: all free ones), its factor or tilt (rad) over time, and when (s) it ends."""
+class LoadOverTime(NamedTuple):
+    """A load, where it acts, its factor or tilt (rad) over time, and when (s) it ends."""
 
     load: AnyLoad
-    body: int
+    body: int  # -1: all free ones
+    edge: geometry.Edge  # m, of a pressure
     stretches: tuple[Stretch, ...]
     end: float
 
@@ -135,7 +136,7 @@ class Support:
     direction: tuple[float, float] = (1.0, 0.0)
     motion: MotionPieces | None = None
     weight: float = 0.0
-    loads: tuple[ActingLoad, ...] = ()
+    loads: tuple[LoadOverTime, ...] = ()
 
     @property
     def way(self) -> str:
@@ -197,13 +198,12 @@ def support_of(scenario: Scenario, happened: Sequence[EventRecord] = ()) -> Supp
     timeline = list(zip(scenario.events, times, strict=True))
     numbers = {body.name: number for number, body in enumerate(placed)}
     loads = tuple(
-        ActingLoad(
-            load,
-            numbers[load.body] if isinstance(load, OnBody) else -1,
-            stretches_of(load, scenario.ground.tilt),
-            min((at for event, at in timeline if load.name in event.unload), default=math.inf),
+        LoadOverTime(
+            *one,
+            stretches_of(one.load, scenario.ground.tilt),
+            min((at for event, at in timeline if one.load.name in event.unload), default=math.inf),
         )
-        for load in scenario.loads
+        for one in open_faces.acting_loads(scenario, numbers)
     )
     return Support(
         profile=scenario.ground.profile or Support.profile,

@@ -326,7 +326,7 @@ def assemble_world(
     world.large[...] = large
     for layout, records, control in zip(layouts, world.loads, controls[:, 0], strict=True):
         springs = excitation.springs_of(layout.scenario, layout.placed, float(control["step"]))
-        for record, (stiffness, damping) in zip(records[len(layout.scenario.loads) :], springs, strict=True):
+        for record, (stiffness, damping) in zip(records[records.size - len(springs) :], springs, strict=True):
             record.stiffness, record.damping = stiffness, damping
     world.clock["motion_piece"][:, 0] = layouts[0].drives.paths
     world.controls["driven"][:, 0] = layouts[0].drives.driven.size

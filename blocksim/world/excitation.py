@@ -4,17 +4,18 @@ The motion of supports and of driven bodies is a cubic polynomial of displacemen
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from blocksim.kernels.common import arrays
-from blocksim.scenario import PlacedBody, Scenario, motion, place_bodies, start
+from blocksim.scenario import PlacedBody, Scenario, motion, open_faces, place_bodies
 from blocksim.scenario.models import actuators, loads
 
 COEFFICIENTS = ("c0", "c1", "c2", "c3")
 STANDSTILL = arrays.zeros(1, arrays.MOTION_PIECE)
+ALL = -1  # bodies on which a load acts
 
 
 class LoadArrays(NamedTuple):
@@ -30,23 +31,27 @@ def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
     """Return the loads of a scenario in its order, then its actuators, whose stiffness follows from the step."""
     acts = bool(scenario.loads or scenario.actuators)
     numbers = {body.name: number for number, body in enumerate(placed)} if acts else {}
-    records = arrays.zeros(len(scenario.loads) + len(scenario.actuators), arrays.LOAD)
+    acting = [*open_faces.acting_loads(scenario, numbers)]
+    records = arrays.zeros(len(acting) + len(scenario.actuators), arrays.LOAD)
     rows: list[loads.Stretch] = []
-    push = end = 0.0
-    for record, load in zip(records, scenario.loads, strict=False):
+    pushes, end = {ALL: 0.0}, 0.0  # by body
+    for record, one in zip(records, acting, strict=False):
+        load = one.load
         stretches = loads.stretches_of(load, scenario.ground.tilt)
         largest = max(abs(one.value) for one in stretches)
-        fields, own = _fields(scenario, load, placed, numbers, largest)
+        fields, own = _fields(scenario, one, placed, largest)
         for name, value in fields.items():
             record[name] = value
-        record["body"] = numbers[load.body] if isinstance(load, loads.OnBody) else 0
+        record["body"] = max(one.body, 0)
         record["first_piece"], record["last_piece"] = len(rows), len(rows) + len(stretches)
         level = 1.0  # m: of water the history is that of the level
         if isinstance(load, loads.Pressure) and load.water_level is not None:
             level = load.water_level
-        rows += [one._replace(value=level * one.value, rate=level * one.rate) for one in stretches]
-        push, end = push + own, max(end, stretches[-1].start)
-    for record, actuator in zip(records[len(scenario.loads) :], scenario.actuators, strict=True):
+        rows += [part._replace(value=level * part.value, rate=level * part.rate) for part in stretches]
+        pushes[one.body] = pushes.get(one.body, 0.0) + own
+        end = max(end, stretches[-1].start)
+    push = pushes.pop(ALL) + max(pushes.values(), default=0.0)
+    for record, actuator in zip(records[len(acting) :], scenario.actuators, strict=True):
         path, body = actuators.stretches_of(actuator.displacement), placed[numbers[actuator.body]]
         record.kind, record.body, (record.x, record.y) = arrays.LOAD_ACTUATOR, numbers[actuator.body], actuator.point
         record.fx, record.fy = math.cos(actuator.direction), math.sin(actuator.direction)
@@ -63,20 +68,20 @@ def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
 
 
 def _fields(
-    scenario: Scenario, load: loads.AnyLoad, placed: Sequence[PlacedBody], numbers: Mapping[str, int], largest: float
+    scenario: Scenario, acting: open_faces.ActingLoad, placed: Sequence[PlacedBody], largest: float
 ) -> tuple[dict[str, float], float]:
-    """Return the fields of the record of a load, but for its body and pieces, and a bound of its push.
+    """Return the fields of the record of a load as it acts, but for its body and pieces, and a bound of its push.
 
     That is what it gives a point of a body (m/s2) beyond gravity of its usual size, with a factor of `largest`.
     """
-    tilt = scenario.ground.tilt
+    load, tilt = acting.load, scenario.ground.tilt
     if isinstance(load, loads.Gravity):  # it turns, and gets no larger
         return {"kind": arrays.LOAD_TILT, "fx": scenario.gravity}, 0.0
     if isinstance(load, loads.Horizontal):
         size = load.magnitude * scenario.gravity
         fields = {"kind": arrays.LOAD_FIELD, "fx": size * math.cos(tilt), "fy": -size * math.sin(tilt)}
         return fields, largest * abs(load.magnitude) * scenario.gravity
-    body = placed[numbers[load.body]]
+    body = placed[acting.body]
     radius = body.radius
     if isinstance(load, loads.Moment):
         fields = {"kind": arrays.LOAD_FORCE, "torque": load.magnitude}
@@ -89,7 +94,7 @@ def _fields(
         fields |= {"stays": load.line == "space", "base_x": base_x, "base_y": base_y}
         force, arm = abs(load.magnitude), math.hypot(*load.point)
     else:
-        (x0, y0), (x1, y1), (nx, ny) = start.face_of(body.corners, load.face) or start.NO_FACE
+        (x0, y0), (x1, y1), (nx, ny) = acting.edge
         length = math.hypot(x1 - x0, y1 - y0)
         fields = {"kind": arrays.LOAD_FORCE, "x": 0.5 * (x0 + x1), "y": 0.5 * (y0 + y1), "turns": 1.0}
         if load.magnitude is not None:

@@ -13,9 +13,10 @@ from hypothesis import given, strategies as st
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_from_mapping
 from blocksim.scenario.models.loads import Face
+from blocksim.scenario.open_faces import face_of, strip_before
 from blocksim.scenario.overrides import freeze
 from blocksim.scenario.placement import LENGTH_WITHOUT_BLOCKS, PlacedBody, reference_length, smallest_width
-from blocksim.scenario.start import face_of, impossible_starts, strip_before
+from blocksim.scenario.start import impossible_starts
 from tests.scenario.conftest import BRICK as OAK_BRICK, MATERIAL, SCENARIOS, data_of
 
 BRICK = {"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "aluminium"}

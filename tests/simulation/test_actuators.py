@@ -35,6 +35,7 @@ def pushed(scheme: str, end: float | None = None, **jack: Any) -> Scenario:
         "start": {"settle": True},
         "time": time,
         "output": {"every": "1 ms"},
+        "events": jack.pop("events", []),
         "actuators": [{"name": "jack", "body": "b", "displacement": RAMP, **jack}],
     }
     return scenario_from_mapping(data)
@@ -116,3 +117,15 @@ def test_a_run_with_an_actuator_is_resumed_to_the_same_bits(scheme: str, tmp_pat
     assert resumed.summary.final_state_sha256 == whole.summary.final_state_sha256
     for column in ("force", "displacement", "work"):
         assert np.array_equal(resumed.probes["jack"][column], whole.probes["jack"][column])
+
+
+@both
+def test_an_actuator_lets_go_at_an_event_and_the_block_slides_to_rest(scheme: str) -> None:
+    release = [{"at": 0.05, "unload": ["jack"]}]
+    run = simulate(pushed(scheme, end=0.1, events=release))
+    jack = run.probes["jack"]
+    after = jack.time > 0.051
+    assert (jack["force"][after] == 0.0).all()
+    assert jack["head"][-1] == pytest.approx(0.9e-3, rel=0.01)  # it stopped: 0.045 s at full speed
+    assert jack["displacement"][-1] == pytest.approx(jack["head"][-1], rel=0.05)
+    assert run.summary.energy_J.relative_residual < 1e-3

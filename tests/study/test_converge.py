@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from blocksim.scenario import Document, Scenario
-from blocksim.scenario.start import soil_tables
+from blocksim.scenario.placement import soil_tables
 from blocksim.study.converge import (
     Convergence,
     ConvergenceVerdict,

@@ -14,12 +14,13 @@ from blocksim.scenario import PlacedSegment, scenario_from_mapping
 from blocksim.scenario.geometry import regular
 from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure, Stretch
 from blocksim.scenario.motion import MotionPieces
+from blocksim.scenario.open_faces import NO_FACE
 from blocksim.view import style
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.paints import by_speed, by_turn
-from blocksim.view.run_data import ActingLoad, Support, support_of
+from blocksim.view.run_data import LoadOverTime, Support, support_of
 from blocksim.view.scene import PictureOptions
 from blocksim.view.strip import draw_strip
 from blocksim.view.studies import Bars, LevelPanel, draw_levels, draw_tornado
@@ -45,13 +46,14 @@ MOVING = Support(motion=PIECES, direction=(np.cos(0.3), np.sin(0.3)), fixed=(Tru
 STEP = Support(profile=((0.05, 0.0), (0.05, -0.05)), fixed=(True, False, False))
 TILTED = Support(tilt=-0.2)
 LEGEND = ("total", "alone")
+TOP = ((-0.016, 0.025), (0.016, 0.025), (0.0, 1.0))
 RISING = (Stretch(0.0, 0.0, 2.0), Stretch(0.5, 1.0, 0.0))
 LOADED = Support(
     loads=(
-        ActingLoad(Force(kind="force", body="1", magnitude=-2e3, point=(0.016, 0.0)), 0, RISING, np.inf),
-        ActingLoad(Moment(kind="moment", body="2", magnitude=0.5), 1, RISING, np.inf),
-        ActingLoad(Pressure(kind="pressure", body="3", face="top", magnitude=5e6), 2, RISING, 0.5),
-        ActingLoad(Horizontal(kind="horizontal", magnitude=0.25), -1, RISING, np.inf),
+        LoadOverTime(Force(kind="force", body="1", magnitude=-2e3, point=(0.016, 0.0)), 0, NO_FACE, RISING, np.inf),
+        LoadOverTime(Moment(kind="moment", body="2", magnitude=0.5), 1, NO_FACE, RISING, np.inf),
+        LoadOverTime(Pressure(kind="pressure", body="3", face="top", magnitude=5e6), 2, TOP, RISING, 0.5),
+        LoadOverTime(Horizontal(kind="horizontal", magnitude=0.25), -1, NO_FACE, RISING, np.inf),
     ),
     motion=PIECES,
 )

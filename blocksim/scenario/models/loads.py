@@ -130,6 +130,9 @@ Axes = Annotated[Literal["world", "body"], base.OneOf(("world", "body"))]
 Line = Literal["body", "space"]
 NORMALS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, 1.0), "bottom": (0.0, -1.0)}
 """Outward normals of the sides of a body, along its axes."""
+BACK, FRONT = "back", "front"
+SIDES = ("left", "right", BACK, FRONT)
+"""What a pressure may act on of a structure."""
 
 
 class FaceChoice(q.FieldReader):
@@ -139,8 +142,8 @@ class FaceChoice(q.FieldReader):
         """Pass what may name a face; raises a pydantic error."""
         if isinstance(value, str) and any(letter.isdigit() for letter in value):
             q.Quantity(q.ANGLE).read(value)
-        elif value not in [*NORMALS] and not (type(value) is int and 0 < value <= geometry.COUNTS["maxItems"]):
-            similar = spelling.nearest(value, NORMALS, most=2) if isinstance(value, str) else None
+        elif value not in [*NORMALS, *SIDES] and not (type(value) is int and 0 < value <= geometry.COUNTS["maxItems"]):
+            similar = spelling.nearest(value, [*NORMALS, BACK, FRONT], most=2) if isinstance(value, str) else None
             hint = f"did you mean {q.toml(similar)}? " if similar else ""
             wanted = 'the direction of its normal such as "150 deg", or its number from 1 on'
             raise q.invalid(f"{q.toml(value)} is no face; {hint}use {' or '.join(map(q.toml, NORMALS))}, {wanted}")
@@ -149,7 +152,10 @@ class FaceChoice(q.FieldReader):
     def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
         """Return the JSON Schema of all three."""
         number = {"type": "integer", "minimum": 1, "maximum": geometry.COUNTS["maxItems"]}
-        return {**usual, "anyOf": [{"enum": [*NORMALS]}, number, {"type": "string", "examples": ["150 deg"]}]}
+        return {
+            **usual,
+            "anyOf": [{"enum": [*NORMALS, BACK, FRONT]}, number, {"type": "string", "examples": ["150 deg"]}],
+        }
 
 
 Face = Annotated[int | str, FaceChoice()]
@@ -198,16 +204,21 @@ class Moment(VaryingLoad):
 
 
 class Pressure(VaryingLoad):
-    """Pressure on a face of a body, uniform or of water below a level; it moves with the face.
+    """Pressure on a face of a body or on a side of a structure, uniform or of water below a level; it moves with faces.
 
-    The factor of a history goes with the pressure, and for water with the level: the water rises and falls.
+    On a structure it acts on all that is open on that side at the start: see open_faces.py. The factor of a
+    history goes with the pressure, and for water with the level: the water rises and falls.
     """
 
     kind: Literal["pressure"] = setting("kind of load")
-    body: str = BODY
+    body: str | None = setting("the name of the body that it acts on; give this or structure", None)
+    structure: Annotated[int, Field(ge=1)] | None = setting(
+        "the number of the structure that it acts on, 1 for the first; give this or body", None
+    )
     face: Face = setting(
         "face of the body before it is turned by its angle: left, right, top, bottom, the direction of its normal "
-        '("150 deg" from +x), each the nearest there is, or its number (1 begins at the first corner)'
+        '("150 deg" from +x), each the nearest there is, or its number (1 begins at the first corner); of a structure '
+        "left, right, back (where soil is; left without) or front"
     )
     magnitude: q.AnyPressure | None = setting("uniform pressure, negative for suction; give this or water_level", None)
     water_level: q.NonNegativeLength | None = setting(
@@ -216,6 +227,11 @@ class Pressure(VaryingLoad):
     unit_weight: q.UnitWeight = setting("weight per volume of the water", WATER)
 
     def _check(self) -> None:
+        base.require_one("what it acts on is missing: give body or structure", body=self.body, structure=self.structure)
+        if self.structure is not None and self.face not in SIDES:
+            raise q.invalid(f"a structure has the sides {', '.join(SIDES)}", "face")
+        if self.body is not None and self.face in (BACK, FRONT):
+            raise q.invalid(f"{self.face} is a side of a structure; a body has left, right, top, bottom", "face")
         missing = 'the pressure is missing: give magnitude (such as "10 kPa") or water_level'
         base.require_one(missing, magnitude=self.magnitude, water_level=self.water_level)
         if self.magnitude is not None and "unit_weight" in self.model_fields_set and self.unit_weight != WATER:

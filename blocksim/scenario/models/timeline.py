@@ -171,7 +171,7 @@ class Event(Table):
     remove: Names = setting('names of bodies and walls ("wall 1" is the first) that go', ())
     fix: Names = setting("names of bodies that are fixed from then on", ())
     free: Names = setting("names of fixed or driven bodies that are free from then on", ())
-    unload: Names = setting("names of loads that end", ())
+    unload: Names = setting("names of loads that end, and of actuators that let go", ())
     velocity: NewVelocity | None = setting("velocity that a body gets", None)
 
     def _check(self) -> None:

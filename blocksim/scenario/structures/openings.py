@@ -63,18 +63,19 @@ def cut_courses(
     Raises UnfitError for openings that end within a course, reach out of the wall or into each other.
     """
     end = max(piece.right for course in courses for piece in course)
+    wall = f"the wall, which is {end:g} m long and {len(courses) * height:g} m high"
     cuts: list[list[_Cut]] = [[] for _ in courses]
     for number, one in enumerate(openings):
         first, last = (_whole(one, key, height) for key in ("bottom", "height"))
         last += first
         if last > len(courses) or one.left + one.width > end * (1.0 + SAME):
-            raise UnfitError("openings", f"opening {number + 1} reaches out of the wall")
+            raise UnfitError("openings", f"opening {number + 1} reaches out of {wall}")
         for course in range(first, last):
             cuts[course].append(_Cut(one.left, one.left + one.width))
         if one.lintel is not None:
             left = one.left + 0.5 * (one.width - one.lintel)
             if last == len(courses) or left < -SAME * end or left + one.lintel > end * (1.0 + SAME):
-                raise UnfitError("openings", f"the lintel of opening {number + 1} reaches out of the wall")
+                raise UnfitError("openings", f"the lintel of opening {number + 1} reaches out of {wall}")
             lintel = Piece(last, left, left + one.lintel)
             cuts[last].append(_Cut(left - gap, lintel.right + gap, lintel))
     found: list[Piece] = []

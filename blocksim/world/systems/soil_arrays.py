@@ -9,7 +9,7 @@ from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.common.systems import Stages
 from blocksim.kernels.soil import arrays, contact, energy, step
 from blocksim.kernels.sph.functions import WENDLAND_SUPPORT
-from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments, start
+from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments, placement
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.world import build, interactions
 from blocksim.world.systems import soils
@@ -26,7 +26,7 @@ FEW_TOUCHES = 128
 
 def build_soils(scenario: Scenario) -> arrays.Soils:
     """Return the arrays of the soils of a scenario at time zero."""
-    tables = start.soil_tables(scenario)
+    tables = placement.soil_tables(scenario)
     elements = soils.elements_of(scenario)
     initial, kinds = elements.start, {table.name: number for number, table in enumerate(tables)}
     n = initial.shape[1]

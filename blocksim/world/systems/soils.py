@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import GROUND, Scenario, geometry, overrides, place_bodies, resolve_pair, start
+from blocksim.scenario import GROUND, Scenario, geometry, overrides, place_bodies, placement, resolve_pair, start
 from blocksim.scenario.models import contact, timeline
 from blocksim.scenario.models.geometry import Material
 from blocksim.scenario.models.soil import SoilTable
@@ -121,7 +121,7 @@ def geostatic_stress(scenario: Scenario, table: SoilTable, places: system.Floats
         return stress
     weight = np.zeros(len(places))
     gravity = scenario.gravity * math.cos(scenario.ground.tilt)
-    for other in start.soil_tables(scenario):
+    for other in placement.soil_tables(scenario):
         density = scenario.materials[other.material].density
         weight += density * gravity * geometry.height_above(other.corners, places)
     at_rest = earth_pressure_at_rest(scenario.materials[table.material])
@@ -132,7 +132,7 @@ def geostatic_stress(scenario: Scenario, table: SoilTable, places: system.Floats
 
 def weak_thrusts(scenario: Scenario) -> Iterator[str]:
     """Yield a warning for each soil beside blocks that may yield, whose thrust on them is known to be too small."""
-    for soil in start.soil_tables(scenario):
+    for soil in placement.soil_tables(scenario):
         rows = geometry.count_across(soil.corners, soil.spacing)[1]
         per_row, less = LACK[soil.gradient]
         share = per_row / rows - less
@@ -303,7 +303,7 @@ SHADES = (
 
 def elements_of(scenario: Scenario) -> system.Elements:
     """Return the particles of all soils of a scenario."""
-    tables = start.soil_tables(scenario)
+    tables = placement.soil_tables(scenario)
     places = [start.particle_places(table, scenario) for table in tables]  # m, (n, 2)
     soils = [*zip(tables, places, strict=True)]
     names = tuple(f"{table.name}.{number}" for table, one in soils for number in range(1, len(one) + 1))
@@ -327,7 +327,7 @@ def _state(soils: Any, count: int) -> system.Floats:
 
 
 def _largest_step(scenario: Scenario) -> float:
-    tables = start.soil_tables(scenario)
+    tables = placement.soil_tables(scenario)
     usual = float(timeline.Explicit.model_fields["safety"].default)
     finer = min(1.0, float(getattr(scenario.time, "safety", usual)) / usual)  # a finer step is finer for all
     courant = COURANT * finer
@@ -365,8 +365,8 @@ SOILS = system.System(
     largest_step=_largest_step,
     stages=lambda: soil_kernels().STAGES,
     cost=COST,
-    dearer=lambda scenario: max(GRADIENT_COST[table.gradient] for table in start.soil_tables(scenario)),
-    parts=lambda scenario: tuple(table.name for table in start.soil_tables(scenario)),
+    dearer=lambda scenario: max(GRADIENT_COST[table.gradient] for table in placement.soil_tables(scenario)),
+    parts=lambda scenario: tuple(table.name for table in placement.soil_tables(scenario)),
     touching=body_contacts,
     shades=SHADES,
     ending=final_table,

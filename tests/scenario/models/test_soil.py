@@ -12,6 +12,7 @@ from blocksim.scenario import (
     geometry,
     load_scenario,
     place_bodies,
+    placement,
     scenario_from_mapping,
     scenario_hash,
     scenario_to_toml,
@@ -78,7 +79,7 @@ def arch_under(level: float) -> dict[str, Any]:
 
 def test_fill_lies_around_and_above_blocks_but_not_in_and_below_them() -> None:
     scenario = scenario_from_mapping(arch_under(0.8))
-    (soil,) = start.soil_tables(scenario)
+    (soil,) = placement.soil_tables(scenario)
     places, whole = start.particle_places(soil, scenario), geometry.fill_lattice(soil.corners, soil.spacing)
     outlines = [np.array([body.ground_point(*at) for at in body.corners]) for body in place_bodies(scenario)]
     apart = np.min([geometry.edge_distance(places, corners) for corners in outlines], axis=0)

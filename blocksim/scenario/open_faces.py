@@ -1,0 +1,195 @@
+"""Where a pressure acts: on one face of a body, or on all that is open on a side of a structure.
+
+A side of a structure is what a fluid that comes from there reaches along level ways: the parts of faces against which
+nothing lies, and from which a line along x meets no other block of the structure. Treads of steps and the undersides of
+what overhangs belong to it; the jambs of openings do not, nor does a level crown, which both sides see.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.scenario import geometry, placement
+from blocksim.scenario.models.loads import BACK, FRONT, NORMALS, AnyLoad, Face, OnBody, Pressure
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.placement import PlacedBody
+from blocksim.scenario.units import ANGLE, Quantity
+
+NO_FACE = (0.0, 0.0), (0.0, 0.0), (0.0, 1.0)
+STRIP = 1e-3
+"""Thickness of the strip before a face in which nothing else may lie, in smaller sides of the body."""
+AS_NEAR = 1e-6
+"""Difference of cosines up to which two faces point into a direction as much as one another."""
+Floats = NDArray[np.float64]
+Interval = tuple[float, float]
+
+
+class OpenFace(NamedTuple):
+    """A face, or a part of one, on which a pressure acts: the number of its body, and an edge along its axes (m)."""
+
+    body: int
+    edge: geometry.Edge
+
+
+class ActingLoad(NamedTuple):
+    """A load as it acts on one body (-1: on all free ones); of a pressure with the edge (m) that it is on."""
+
+    load: AnyLoad
+    body: int = -1
+    edge: geometry.Edge = NO_FACE
+
+
+def acting_loads(scenario: Scenario, numbers: Mapping[str, int]) -> Iterator[ActingLoad]:
+    """Yield the loads of a scenario in order, those on sides of structures once a face; `numbers` of bodies by name."""
+    for load in scenario.loads:
+        if isinstance(load, Pressure):
+            yield from (ActingLoad(load, *one) for one in faces_under(scenario, load))
+        elif isinstance(load, OnBody):
+            yield ActingLoad(load, numbers[str(load.body)])
+        else:
+            yield ActingLoad(load)
+
+
+def face_of(corners: Sequence[geometry.Corner], face: Face) -> geometry.Edge | None:
+    """Return the ends of a face (m, in the body), the left or else lower one first, and its outward normal.
+
+    `corners` are counter-clockwise. None where it does not exist, or two faces point that way as much as one another.
+    """
+    edges = [*geometry.edges_of(corners)]
+    if isinstance(face, int):
+        edges = edges[face - 1 : face]
+    else:
+        angle = 0.0 if face in NORMALS else Quantity(ANGLE).read(face)
+        way = NORMALS.get(face, (math.cos(angle), math.sin(angle)))
+        most = max(geometry.dot(way, normal) for _, _, normal in edges)
+        edges = [edge for edge in edges if geometry.dot(way, edge[2]) >= most - AS_NEAR]
+    if len(edges) != 1:
+        return None
+    begin, end, normal = edges[0]
+    return min(begin, end), max(begin, end), normal
+
+
+def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
+    """Return the strip before a face of a body, a little shorter than the face at both ends."""
+    thickness = STRIP * body.least_width
+    (x0, y0), (x1, y1), (nx, ny) = face_of(body.corners, face) or NO_FACE
+    x, y = 0.5 * (x0 + x1 + nx * thickness), 0.5 * (y0 + y1 + ny * thickness)
+    size_x, angle = math.hypot(x1 - x0, y1 - y0) - 2.0 * thickness, body.angle + math.atan2(y1 - y0, x1 - x0)
+    x, y = body.ground_point(x, y)
+    return body._replace(size_x=size_x, size_y=thickness, x=x, y=y, angle=angle, outline=())
+
+
+def faces_under(scenario: Scenario, load: Pressure) -> list[OpenFace]:
+    """Return the faces on which a pressure acts; those of a structure in the order of its bodies."""
+    placed, origins = placement.placement_of(scenario)[1:]
+    if load.structure is None:
+        number = next(number for number, body in enumerate(placed) if body.name == load.body)
+        return [OpenFace(number, face_of(placed[number].corners, load.face) or NO_FACE)]
+    own = [number for number, origin in enumerate(origins) if origin == ("structures", load.structure - 1)]
+    return [*_open_faces(scenario, placed, own, side_of(scenario, load))] if own else []
+
+
+def side_of(scenario: Scenario, load: Pressure) -> float:
+    """Return 1.0 for the right side of a structure, -1.0 for the left one.
+
+    Its back is where most soils are, on the left where there are none: what is pushed over falls to its front.
+    """
+    if load.face not in (BACK, FRONT):
+        return NORMALS[str(load.face)][0]
+    placed, origins = placement.placement_of(scenario)[1:]
+    of_structure = ("structures", (load.structure or 0) - 1)
+    own = [body.x for body, origin in zip(placed, origins, strict=True) if origin == of_structure]
+    middle = 0.5 * (min(own) + max(own)) if own else 0.0
+    soils = [float(soil.corners[:, 0].mean()) for soil in placement.soil_tables(scenario)]
+    back = 1.0 if sum(math.copysign(1.0, place - middle) for place in soils) > 0.0 else -1.0
+    return back if load.face == BACK else -back
+
+
+class _Shapes:
+    """Convex polygons: corners (m, (n, k, 2)), the outward normals of their edges, and boxes about them."""
+
+    def __init__(self, corners: Floats) -> None:
+        self.corners = corners
+        self.normals, self.are_edges = geometry.outward_normals(corners)
+        self.low, self.high = corners.min(axis=1), corners.max(axis=1)
+
+    def on_line(self, begin: Floats, way: Floats, most: float) -> list[Interval]:
+        """Return the parts of a line from a place on, at most as long (m), that lie in polygons."""
+        ends = np.stack([begin, begin + most * way])
+        near = np.flatnonzero(((self.low <= ends.max(axis=0)) & (self.high >= ends.min(axis=0))).all(axis=1))
+        normals, are_edges = self.normals[near], self.are_edges[near]
+        outside = np.einsum("nkd,nkd->nk", normals, begin - self.corners[near])  # m, of its begin
+        rate = normals @ way
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at = -outside / rate
+        low = np.where(are_edges & (rate < 0.0), at, 0.0).max(axis=1, initial=0.0)
+        high = np.where(are_edges & (rate > 0.0), at, most).min(axis=1, initial=most)
+        misses = (are_edges & (rate == 0.0) & (outside > 0.0)).any(axis=1) | (low >= high)
+        return sorted(zip(low[~misses].tolist(), high[~misses].tolist(), strict=True))
+
+
+def _corners_of(placed: Sequence[PlacedBody]) -> Floats:
+    """Return the corners of bodies where they are (m, (n, k, 2)), the last one repeated."""
+    most = max(len(body.corners) for body in placed)
+    rows = [[body.ground_point(*corner) for corner in body.corners] for body in placed]
+    return np.array([[*row, *row[-1:] * (most - len(row))] for row in rows])
+
+
+def _ground_below(scenario: Scenario, left: float, right: float, depth: float) -> Floats:
+    """Return polygons (m) of this depth of what is solid behind the ground's surface and walls."""
+    segments = placement.place_segments(scenario)
+    rows = [] if scenario.ground.profile else [[(left, -depth), (right, -depth), (right, 0.0), (left, 0.0)]]
+    for one in segments:
+        x, y = depth * (one.y1 - one.y0) / one.length, depth * (one.x0 - one.x1) / one.length
+        rows.append([(one.x0, one.y0), (one.x0 + x, one.y0 + y), (one.x1 + x, one.y1 + y), (one.x1, one.y1)])
+    return np.array(rows).reshape(-1, 4, 2)
+
+
+def _open_faces(
+    scenario: Scenario, placed: Sequence[PlacedBody], own: Sequence[int], side: float
+) -> Iterator[OpenFace]:
+    """Yield what is open on a side of the free blocks of a structure, in their order."""
+    corners = _corners_of(placed)
+    left, right = float(corners[..., 0].min()), float(corners[..., 0].max())
+    length, depth = right - left, placement.smallest_width(placed)
+    blocks, walls = _Shapes(corners[own]), _Shapes(corners)
+    ground = _Shapes(_ground_below(scenario, left - length, right + length, depth))
+    for number in own:
+        body = placed[number]
+        if body.fixed:
+            continue
+        strip = STRIP * body.least_width
+        for begin, end, normal in geometry.edges_of(body.corners):
+            first, last = (np.array(body.ground_point(*place)) for place in (begin, end))
+            size = math.dist(begin, end)
+            way = (last - first) / size
+            outward = np.array([way[1], -way[0]])
+            if side * outward[0] < -AS_NEAR:
+                continue
+            before = first + 0.5 * strip * outward
+            covered = [*walls.on_line(before, way, size), *ground.on_line(before, way, size)]
+            for low, high in _gaps(covered, size):
+                middle = before + 0.5 * (low + high) * way
+                if high - low <= strip or blocks.on_line(middle, np.array([side, 0.0]), length):
+                    continue
+                if outward[1] > 1.0 - AS_NEAR and not blocks.on_line(middle, np.array([-side, 0.0]), length):
+                    continue  # a crown
+                ends = [
+                    (begin[0] + share * (end[0] - begin[0]), begin[1] + share * (end[1] - begin[1]))
+                    for share in (low / size, high / size)
+                ]
+                yield OpenFace(number, (min(ends), max(ends), normal))
+
+
+def _gaps(covered: Sequence[Interval], size: float) -> Iterator[Interval]:
+    """Yield what intervals leave of the one from 0 to a size."""
+    reached = 0.0
+    for low, high in sorted(covered):
+        if low > reached:
+            yield reached, low
+        reached = max(reached, high)
+    if reached < size:
+        yield reached, size
