@@ -176,7 +176,7 @@ def _boundaries(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
         begin, end = np.array([piece.x0, piece.y0]), np.array([piece.x1, piece.y1])
         back = np.array([piece.y1 - piece.y0, piece.x0 - piece.x1]) / piece.length * 0.5 * soil.spacing
         if geometry.cuts(begin, end, corners):
-            near = min(max(piece.x1, float(corners[:, 0].min())), float(corners[:, 0].max()))  # the last piece is endless
+            near = np.clip(piece.x1, corners[:, 0].min(), corners[:, 0].max())  # the last piece is endless
             yield f"wall {number}" if number > 0 else f"the ground near x = {near:.6g} m"
         elif number > 0 and geometry.is_inside(begin + places * (end - begin) + back, corners).any():
             # nothing would hold soil that lies against the back of a wall
