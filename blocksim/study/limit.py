@@ -71,6 +71,7 @@ STANDS = observables.Response.STANDS.value
 OnOther = Callable[[LimitPlan], None]
 OnLimit = Callable[[float, limit_answer.LimitAnswer], None]
 Rows = Mapping[Number, Row]
+STOOD = {True: Stability.STANDS, False: Stability.FALLS}
 RATIO = 10.0  # of stiffness between a search and the next one
 BEYOND = 10.0 / 9.0  # of the way to stiff contacts over that to springs ten times as stiff
 FAR = 0.08  # of a limit: two of them that are no farther apart are extrapolated
@@ -358,18 +359,17 @@ class _Search:
         return limit.bound, self._on_springs(Change(low, high, sides[limit.below], sides[limit.above]))
 
     def _on_springs(self, near: Change[Stability]) -> Change[Stability]:
-        """Return a bracket of equilibria on springs, found without time and as narrow as wanted; if none, that given.
+        """Return a bracket of equilibria on springs, found without time and as narrow as can be; if none, that given.
 
-        Two runs confirm it.
+        Two runs confirm one as narrow as wanted; where an equilibrium is not certain, runs go on from the last bracket.
         """
         plan, verdicts = self.plan, dict[Number, Stability]()
         while values := limit_plan.next_near(plan.span, verdicts, near, plan.tolerance):
-            for value in values:
-                scenario = plan.scenario_at(value)
-                found = rest_state.rests(scenario) if motion.settles(scenario) else None
-                if found is None:
-                    return near
-                verdicts[value] = Stability.STANDS if found else Stability.FALLS
+            scenarios = {value: plan.scenario_at(value) for value in values}
+            rests = {at: rest_state.rests(one) if motion.settles(one) else None for at, one in scenarios.items()}
+            verdicts |= {at: STOOD[one] for at, one in rests.items() if one is not None}
+            if None in rests.values():
+                break
         changes = limit_plan.changes_in(verdicts)
         return changes[0] if len(changes) == 1 else near
 
