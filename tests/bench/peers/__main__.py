@@ -1,4 +1,7 @@
-"""The same scenes by blocksim, pymunk and Box2D: `python -m tests.bench.peers --help`, or `make bench-peers`."""
+"""The same scenes by blocksim, pymunk and Box2D: `python -m tests.bench.peers --help`, or `make bench-peers`.
+
+Box2D 2.3 is a package; version 3 takes part where the environment variable BOX2D_V3 holds the path of a library of it.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,8 @@ from typing import TYPE_CHECKING
 from blocksim.bench.harness import REPEATS, BenchmarkRun, Effort, machine_lines, report, this_machine
 from blocksim.bench.registry import choose
 from blocksim.errors import BlocksimError
+from tests.bench.peers import box2d_v3
+from tests.bench.peers.bricks import BRICKS
 from tests.bench.peers.engine import Readings
 from tests.bench.peers.heap import HEAP
 from tests.bench.peers.three_blocks import PAPER, WITHOUT_RESTITUTION
@@ -20,7 +25,7 @@ from tests.bench.peers.work_precision import draw_work_precision
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-PEERS = (PAPER, WITHOUT_RESTITUTION, WALL, HEAP)
+PEERS = (PAPER, WITHOUT_RESTITUTION, BRICKS, WALL, HEAP)
 PACKAGES = {"pymunk": "pymunk", "Box2D": "box2d"}  # module: name of its package
 
 
@@ -38,13 +43,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         except ImportError as error:
             parser.error(f"the package {package} is missing ({error}): pip install 'blocksim[bench]'")
     try:
+        without = [box2d_v3.MISSING] if box2d_v3.library() is None else []
+    except OSError as error:
+        parser.error(str(error))
+    try:
         wanted = choose(asked.names, PEERS)
     except BlocksimError as error:
         parser.error(str(error))
     outcomes = [one.run(Effort(asked.quick, max(1, asked.repeats))) for one in wanted]
     _print(outcomes)
     machine = this_machine()
-    print(*machine_lines(machine), sep="\n")  # noqa: T201 - the output of a script
+    print(*without, *machine_lines(machine), sep="\n")  # noqa: T201 - the output of a script
     if asked.out is not None:
         asked.out.write_text(json.dumps(report(machine, outcomes), indent=2) + "\n", encoding="utf-8")
         found = [one.findings.panel for one in outcomes if isinstance(one.findings, Readings)]

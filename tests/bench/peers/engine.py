@@ -111,7 +111,10 @@ class Stepper(ABC):
 
     def solve(self, scene: Scene) -> Final:
         """Compute the scene. Not counted: making it."""
-        world, bodies = self.made(scene)
+        return self.run(*self.made(scene), scene)
+
+    def run(self, world: Any, bodies: list[Any], scene: Scene) -> Final:
+        """Step a world up to the end of the scene."""
         seconds = timed(*self.call(world), count=self.calls(scene))
         x, y = np.array([body.position for body in bodies]).T / self.units
         return Final(x, y, seconds)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from blocksim.bench.harness import UNTIL_SOLVED, TimeSteps
+from tests.bench.peers.box2d_v3 import STIFF, Box2Dv3, library
 from tests.bench.peers.engine import Box2D, Explicit, Nonsmooth, Pymunk, Series
 
 if TYPE_CHECKING:
     from tests.bench.peers.engine import Solver
 
-PYMUNK, BOX2D, EXPLICIT, NONSMOOTH = "pymunk", "Box2D", "explicit", "non-smooth"
+PYMUNK, BOX2D, BOX2D_V3, EXPLICIT, NONSMOOTH = "pymunk", "Box2D", "Box2D v3", "explicit", "non-smooth"
 STEPS = (4e-3, 2.8e-3, 2e-3, 1.4e-3, 1e-3, 7e-4, 5e-4, 2e-4, 1e-4, 5e-5)  # s
 SCALES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1)
 WALL_STEPS = (4e-3, 2e-3, 1e-3, 5e-4)  # s
@@ -42,6 +43,9 @@ def three_blocks_series(restitution: float, *, quick: bool) -> tuple[Series, ...
         *((EXPLICIT, f"explicit, safety {safety:g}", _explicit(scales, safety)) for safety in (0.1, 0.05)),
         *((NONSMOOTH, f"non-smooth, {_parts(n)}", _nonsmooth(steps, n, sweeps)) for n in (1, 3, 4)),
     ]
+    if library() is not None:  # single precision, as above
+        references[BOX2D_V3] = Box2Dv3(finest, 4, STIFF) if quick else Box2Dv3(2e-5, 4, STIFF)
+        found += [(BOX2D_V3, f"Box2D v3, {_parts(n)}", tuple(Box2Dv3(one, n, STIFF) for one in steps)) for n in (1, 4)]
     return tuple(Series(engine, label, levels, references[engine]) for engine, label, levels in found)
 
 
@@ -64,6 +68,7 @@ def wall_racers() -> dict[str, Solver]:
         NONSMOOTH: Nonsmooth(TimeSteps(RACE_STEP)),
         **{f"{PYMUNK}, {n} iterations": Pymunk(RACE_STEP, n) for n in (10, 30)},
         f"{BOX2D}, 10 iterations": Box2D(RACE_STEP, 10),
+        **_third_racer(),
     }
 
 
@@ -73,7 +78,13 @@ def heap_racers() -> dict[str, Solver]:
         NONSMOOTH: Nonsmooth(TimeSteps(RACE_STEP)),
         f"{BOX2D}, 10 iterations": Box2D(RACE_STEP, 10),
         f"{PYMUNK}, 10 iterations": Pymunk(RACE_STEP, 10),
+        **_third_racer(),
     }
+
+
+def _third_racer() -> dict[str, Solver]:
+    """Return Box2D v3 with as many substeps as the non-smooth scheme, nothing where it is not at hand."""
+    return {} if library() is None else {f"{BOX2D_V3}, 4 substeps": Box2Dv3(RACE_STEP, 4, STIFF)}
 
 
 def _stepped(engine: type[Pymunk | Box2D], steps: tuple[float, ...], iterations: int) -> tuple[Solver, ...]:

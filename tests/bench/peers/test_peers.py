@@ -13,6 +13,8 @@ import pytest
 from blocksim.bench.harness import Benchmark, Effort, TimeSteps, single
 from tests.bench.peers import __main__ as script, three_blocks as three_blocks_peers, wall
 from tests.bench.peers.__main__ import main
+from tests.bench.peers.box2d_v3 import MISSING, STIFF, VARIABLE, Box2Dv3, library
+from tests.bench.peers.bricks import BRICKS
 from tests.bench.peers.engine import Box2D, Explicit, Final, Nonsmooth, Pymunk, Readings, Scene, Series, Solver
 from tests.bench.peers.heap import HEAP
 from tests.bench.peers.series import wall_series
@@ -30,10 +32,11 @@ ENGINES = pytest.mark.parametrize(
     [
         ("pymunk", Pymunk(2e-4, 30)),
         ("Box2D", Box2D(2e-4, 30)),
+        (VARIABLE, Box2Dv3(2e-4, 4, STIFF)),
         ("blocksim", Explicit(1e-3, 0.1)),
         ("blocksim", Nonsmooth(TimeSteps(2e-4))),
     ],
-    ids=["pymunk", "Box2D", "explicit", "non-smooth"],
+    ids=["pymunk", "Box2D", "Box2D v3", "explicit", "non-smooth"],
 )
 QUICK = Effort(quick=True)
 
@@ -60,7 +63,10 @@ class Shifted:
 
 @ENGINES
 def test_blocks_start_alike_fall_freely_and_land_on_the_ground(module: str, solver: Solver) -> None:
-    pytest.importorskip(module, exc_type=ImportError)
+    if module == VARIABLE and library() is None:
+        pytest.skip(MISSING)
+    if module != VARIABLE:
+        pytest.importorskip(module, exc_type=ImportError)
     (scene,) = starts(1)
     soon = solver.solve(replace(scene, end=2e-3))
     assert soon.x == pytest.approx([0.016, 0.038, 0.060], abs=1e-5)
@@ -77,12 +83,38 @@ def test_a_heap_of_hexagons_is_timed_and_compared() -> None:
     found = HEAP.measure(Effort(quick=True, repeats=2))
     own, *others = found.numbers
     assert own.quantity == "non-smooth, step 1 ms / 4"
-    assert [one.quantity for one in others] == [f"{name}, 10 iterations: times that" for name in ("Box2D", "pymunk")]
+    assert [one.quantity for one in others][:2] == [
+        f"{name}, 10 iterations: times that" for name in ("Box2D", "pymunk")
+    ]
     assert all(len(one.samples) == 2 and min(one.samples) > 0.0 for one in found.numbers)
     meaning, mine, *_ = found.notes
     assert meaning.startswith("20 random hexagons")
     assert mine.startswith("non-smooth: mean height of the centres ")
     assert mine.endswith("mm, 0.0 and 0.0 mm off in x and y")
+
+
+def test_bricks_are_raced_at_one_step_and_as_near_to_the_finest_answer() -> None:
+    for module in ("pymunk", "Box2D"):
+        pytest.importorskip(module, exc_type=ImportError)
+    found = {one.quantity: one for one in BRICKS.measure(Effort(quick=True, repeats=2)).numbers}
+    assert len(found["20 bricks: pymunk, 10 iterations: times that"].samples) == 2
+    own, *others = [one.median for name, one in found.items() if name.endswith(": distance")]
+    assert others
+    assert max(others) <= 1.05 * own
+
+
+@pytest.mark.parametrize(("path", "told"), [("nowhere.so", "nowhere.so"), ("libm.so.6", "no b2GetVersion")])
+def test_what_is_no_library_of_the_third_box2d_is_wrong_usage(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], path: str, told: str
+) -> None:
+    for name in ("pymunk", "Box2D"):
+        monkeypatch.setitem(sys.modules, name, sys)
+    monkeypatch.setenv(VARIABLE, path)
+    library.cache_clear()
+    with pytest.raises(SystemExit):
+        main(["wall"])
+    library.cache_clear()
+    assert told in capsys.readouterr().err
 
 
 def test_error_is_the_distance_from_the_reference_of_the_same_start(monkeypatch: pytest.MonkeyPatch) -> None:

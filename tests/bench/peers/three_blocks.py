@@ -11,6 +11,7 @@ import numpy as np
 
 from blocksim.bench.harness import RESTITUTION, Benchmark, Effort, Number, Table, TimeSteps, single, three_blocks
 from blocksim.scenario.structures.base import draws
+from tests.bench.peers.box2d_v3 import Box2Dv3, library
 from tests.bench.peers.engine import (
     Box2D,
     Final,
@@ -24,7 +25,7 @@ from tests.bench.peers.engine import (
     empty_space,
     empty_world,
 )
-from tests.bench.peers.series import BOX2D, NONSMOOTH, PYMUNK, three_blocks_series
+from tests.bench.peers.series import BOX2D, BOX2D_V3, NONSMOOTH, PYMUNK, three_blocks_series
 from tests.bench.peers.work_precision import Curve, Panel
 
 if TYPE_CHECKING:
@@ -115,7 +116,8 @@ def _answer(series: Series, levels: list[Level]) -> Answer:
 
 def _calls(scene: Scene) -> dict[str, float]:
     """Return what a call from Python takes (s) with nothing to compute: one a step, but for blocksim one a run."""
-    return {
+    third = {} if library() is None else {BOX2D_V3: call_time(Box2Dv3(1e-3, 1), Box2Dv3(1e-3, 1).empty_world())}
+    return third | {
         PYMUNK: call_time(Pymunk(1e-3, 1), empty_space()),
         BOX2D: call_time(Box2D(1e-3, 1), empty_world()),
         NONSMOOTH: Nonsmooth(TimeSteps(1e-3)).call_time(scene),
