@@ -18,10 +18,12 @@ from blocksim.view.studies import (
     LimitCurve,
     LimitRange,
     OtherLimits,
+    TrialPanel,
     draw_fragility,
     draw_levels,
     draw_limit_curve,
     draw_tornado,
+    draw_trials,
     places,
 )
 from blocksim.view.style import Paper
@@ -91,6 +93,14 @@ def of_bars(*bars: Bars, size: tuple[float, float] | None = None) -> Drawing:
     return lambda path, _: draw_tornado(list(bars), ("mean change", ""), path, "Which inputs matter", Paper(size))
 
 
+def of_trials(*keys: str, is_log: bool = False) -> Drawing:
+    """Return a picture of twelve trials, the best one in colour, over each key from 0.1 to 10."""
+    values = np.geomspace(0.1, 10.0, 12)
+    scores = np.exp(-((np.log(values) - 0.3) ** 2)).round(1)
+    panels = [TrialPanel(key, values, (0.1, 10.0), is_log=is_log) for key in keys]
+    return lambda path, paper: draw_trials(panels, scores, scores == scores.max(), "share inside", path, "fit", paper)
+
+
 def of_probes(*probes: ProbeSeries) -> Drawing:
     return lambda path, paper: draw_probes({one.name: one for one in probes}, path, "run: probes", paper=paper)
 
@@ -106,6 +116,10 @@ STUDIES: dict[str, Drawing] = {
     "levels of little": lambda path, paper: draw_levels(
         [panel(size_mm=1e-6), panel(size_mm=20.0)], path, measured={"b1": 50.0}, paper=paper
     ),
+    "trials of four keys": of_trials(
+        "contact.restitution", "friction.block_block.kinetic", "gravity", "ground.tilt (deg)"
+    ),
+    "trials of one key": of_trials("contact.stiffness_scale", is_log=True),
     "tornado of nothing": of_bars(Bars("x", KEYS, np.zeros(3), np.zeros(3))),
     "tornado of both signs": of_bars(Bars("x", KEYS, np.array([0.2, -0.7, 0.1]), np.zeros(3))),
     "tornado with long keys": of_bars(HARDLY_KNOWN, HARDLY_KNOWN),

@@ -44,6 +44,8 @@ def test_picture_shows_what_it_should_and_no_text_is_covered_or_cut(
 ) -> None:
     ALL[name](Path("picture.png"), OWN)
     (figure,) = caught
+    if mpl.__version_info__ < (3, 11):
+        pytest.skip("details are those of texts as matplotlib sets them from 3.11 on")
     assert overlapping(figure) == []
     golden(described(figure))
 

@@ -339,7 +339,10 @@ def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[floa
     refuse_too_many(path, sets, count)
     values = {name: one[:count] for name, one in sets.items()}
     measured = [values[f"{OBSERVABLES}/{name}"] for name in (*ledger, *COUNTED_UNITS)]
-    steps, time_step = values[STEP], float(sets[STEP].attrs["time_step"])
+    steps, stored = values[STEP], sets[STEP].attrs["time_step"]
+    if np.ndim(stored):
+        raise ValueError(f"its time step of {stored} s is invalid")
+    time_step = float(stored)
     if steps.dtype.kind != "i" or steps.min() < 0:
         raise ValueError("its step numbers are invalid")
     if not (math.isfinite(time_step * float(steps.max())) and time_step > 0.0):
