@@ -243,7 +243,7 @@ class Sensitivity(UnstoredResult):
 
     @property
     def remarks(self) -> list[str]:
-        """What the columns mean, which outputs do not vary, and what failed."""
+        """What the columns mean, which outputs are constant, and what failed."""
         lines = [f"{column}: {meaning}" for column, (_, meaning) in self.method.columns.items()]
         still = [one.name for one in self.outputs if not one.numbers]
         if still:

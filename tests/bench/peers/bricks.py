@@ -81,7 +81,9 @@ def _at_equal_accuracy(size: Size, rounds: int) -> list[Number]:
             if distance <= wanted:
                 off[name], chosen[name] = distance, at(step)
                 break
-    named: Mapping[str, Solver] = {f"{name} of {solver.setting}": solver for name, solver in chosen.items()}
+    named: Mapping[str, Solver] = {
+        name if name == next(iter(chosen)) else f"{name}, {solver.setting}": solver for name, solver in chosen.items()
+    }
     own, *others = raced(named, size.scene, rounds)[0]
     times = [replace(own, unit="CPU ms", samples=tuple(1e3 * one for one in own.samples)), *others]
     distances = [single(f"{name}: distance", "mm", distance) for name, distance in off.items()]
