@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
@@ -274,13 +274,14 @@ class SweepResult(Shown):
 
     @cached_property
     def table(self) -> "pd.DataFrame":
-        """The rows of the table (pandas 3 reads every bit). Raises InputMissingError or InvalidInputError."""
+        """The rows of the table, to the last bit. Raises InputMissingError or InvalidInputError."""
         import pandas as pd
 
         path = self.folder / self.name
+        exact: dict[str, Any] = {"float_precision": "round_trip"} if pd.__version__.startswith("2.") else {}
         try:
             refuse_large(path, MOST_BYTES)
-            table = pd.read_csv(path, dtype=TEXT_COLUMNS)
+            table: pd.DataFrame = cast("Any", pd.read_csv)(path, dtype=TEXT_COLUMNS, **exact)
         except (OSError, ValueError) as error:
             raise InvalidInputError(f"{path}: {NO_TABLE}: {str(error).strip()}") from error
         if not set(table.columns) >= NEEDED or table.columns[0] != "case":
