@@ -92,7 +92,10 @@ SPECIAL: dict[str, Callable[[Readings], None]] = {
 }
 
 
-@pytest.mark.parametrize("measurement", MEASUREMENTS, ids=lambda one: one.name)
+@pytest.mark.parametrize(
+    "measurement",
+    [pytest.param(one, id=one.name, marks=pytest.mark.long if one is START_UP else ()) for one in MEASUREMENTS],
+)
 def test_measurement_tells_its_numbers(
     measurement: Benchmark, golden: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

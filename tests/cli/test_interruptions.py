@@ -21,7 +21,7 @@ SCENES = Path(__file__).with_name("scenes")
 NOMINAL = "scenarios/three_blocks_nominal.toml"
 ENDLESS = ("run", NOMINAL, *SOFT, "--set", "time.stop_at_rest=false", "--quiet")
 LONG = (*ENDLESS, "--set", "time.end=10")  # seconds of a process that is killed somewhere
-SHORT = (*ENDLESS, "--set", "time.end=4")
+SHORT = (*ENDLESS, "--set", "time.end=2")
 OFTEN = ("--checkpoint-every", "50 ms")
 OTHERS = [pytest.param(number, marks=pytest.mark.long) for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)]
 

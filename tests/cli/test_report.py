@@ -170,7 +170,7 @@ assert not any(name.startswith("blocksim.kernels") for name in sys.modules)
 def test_stored_results_are_shown_without_the_solver(finished: Path, finished_sweep: Path, tmp_path: Path) -> None:
     run, swept = str(finished), str(finished_sweep)
     calls = [
-        *(["plot", run, "--kind", kind, "--dpi", "50", "--out", f"{kind}.png"] for kind in ("strip", "history")),
+        *(["plot", run, "--kind", kind, "--dpi", "50", "--out", f"{kind}.png"] for kind in ("final", "history")),
         ["animate", run, "--speed", "1", "--fps", "2", "--width", "200", "--out", "film.gif"],
         *(["export", run, "--format", form, "--out", f"run.{form}"] for form in ("csv", "vtkhdf")),
         ["report", run, swept, "--out", "report.html"],

@@ -14,7 +14,7 @@ import sys
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import permutations
 from pathlib import Path
 
@@ -68,6 +68,7 @@ class Module:
         return [node for node in self.nodes if isinstance(node, Function)]
 
 
+@cache
 def read_package(root: Path = ROOT) -> list[Module]:
     """Return all modules of blocksim below a checkout."""
     folder = root / "blocksim"

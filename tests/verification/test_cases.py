@@ -41,7 +41,7 @@ SHARE = 0.2  # of its tolerance by which a measured number may differ from the k
 ORDER_SHARE = 0.1  # of its bound, for a number with a lower bound only
 HERTZ = "Hertz–Mindlin"  # its law is tested in tests/kernels, its cases are for make test-long
 SLOW = {  # seconds; V9, V11 and the ledgers of tests/simulation are there always
-    "linear": {"V10", "V12", "V15", "V18", "V23"},
+    "linear": {"V10", "V12", "V13", "V15", "V17", "V18", "V23"},
     HERTZ: {case.id for case in CASES} - {"V25"},
     RIGID: {"V18", "V23", "V26"},
 }

@@ -24,17 +24,17 @@ if TYPE_CHECKING:
 ALL = DRAWINGS | STUDIES
 KINDS = ("strip", "final", "history", "levels", "work", "tornado", "series", "lines", "map", "matrix", "histogram")
 SIZES = {
-    "strip": ((4.0, 8.0), (10.0, 3.5)),
-    "final": ((3.2, 4.6), (12.0, 9.0)),
-    "history": ((6.0, 8.0),),
-    "levels": ((3.5, 2.5), (12.0, 9.0)),
-    "levels of three studies": ((8.0, 3.0),),
-    "work": ((6.0, 2.6),),
-    "tornado": ((5.0, 6.0),),
-    "lines": ((7.0, 8.0),),
-    "map": ((9.0, 9.0),),
-    "matrix": ((9.0, 9.0),),
-    "histogram": ((5.0, 8.0),),
+    "strip": (4.0, 8.0),
+    "final": (3.2, 4.6),
+    "history": (6.0, 8.0),
+    "levels": (3.5, 2.5),
+    "levels of three studies": (8.0, 3.0),
+    "work": (6.0, 2.6),
+    "tornado": (5.0, 6.0),
+    "lines": (7.0, 8.0),
+    "map": (9.0, 9.0),
+    "matrix": (9.0, 9.0),
+    "histogram": (5.0, 8.0),
 }
 
 
@@ -64,7 +64,7 @@ def test_same_data_give_the_same_bytes_of_a_valid_file(tmp_path: Path, name: str
         assert first.read_bytes().startswith({"png": b"\x89PNG\r\n\x1a\n", "pdf": b"%PDF-"}[suffix])
 
 
-@pytest.mark.parametrize(("name", "size"), [(name, size) for name, sizes in SIZES.items() for size in sizes])
+@pytest.mark.parametrize(("name", "size"), SIZES.items())
 def test_page_has_the_size_that_was_asked_for_and_everything_lies_on_it(
     caught: list[Figure], name: str, size: tuple[float, float]
 ) -> None:

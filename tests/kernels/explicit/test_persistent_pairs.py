@@ -84,6 +84,12 @@ def evaluate(world: World) -> tuple[Tally, World, World]:
     return Tally(steady, general, frozenset(kinds)), quick, slow
 
 
+def is_near(one: Any, other: Any, size: float, rel: float = 0.0) -> bool:
+    """Return whether numbers, in their order, differ by no more than a size or a share of the larger one."""
+    allowed = np.maximum(size, rel * np.abs(other))
+    return np.shape(one) == np.shape(other) and bool(np.all(np.abs(np.subtract(one, other)) <= allowed))
+
+
 def assert_same(quick: World, slow: World) -> None:
     """Compare totals, contacts, dashpots and losses of two worlds to what round-off in places can do to forces."""
     stiffness = float(quick.interactions.normal_stiffness.max())
@@ -93,7 +99,7 @@ def assert_same(quick: World, slow: World) -> None:
     moved = float(quick.controls[0].step) * float(np.hypot(quick.bodies.vx, quick.bodies.vy).max())
     force = stiffness * place + ROUND_OFF * float(slow.contacts.normal_force.max())
     for name, size in (("fx", force), ("fy", force), ("torque", force * reach)):
-        assert quick.bodies[name] == pytest.approx(slow.bodies[name], abs=4.0 * size), name
+        assert is_near(quick.bodies[name], slow.bodies[name], 4.0 * size), name
     assert quick.bodies.pairs_now.tolist() == slow.bodies.pairs_now.tolist()
     count = int(quick.clock[0].pair_count)
     for name in ("active", "near", "duplicates", "idle", "normal_left", "shear_left"):
@@ -103,19 +109,19 @@ def assert_same(quick: World, slow: World) -> None:
         assert one["slot"].tolist() == other["slot"].tolist()
         assert one["face"].tolist() == other["face"].tolist()
         for name, size in (("spring", place), ("depth", place), ("normal_force", force), ("shear_force", force)):
-            assert one[name] == pytest.approx(other[name], abs=size), name
+            assert is_near(one[name], other[name], size), name
         for direction, name in ((NORMAL, "normal_left"), (SHEAR, "shear_left")):
             if quick.pairs[name][p] > 0:
                 assert_same_dashpots(quick.operators[p, direction], slow.operators[p, direction])
         assert quick.pairs[p].shear_left == 0 or quick.pairs[p].sticking == slow.pairs[p].sticking
     for name in ("dashpot", "friction", "broken"):
-        assert quick.ledger[name] == pytest.approx(slow.ledger[name], rel=1e-9, abs=8.0 * force * (moved + place)), name
+        assert is_near(quick.ledger[name], slow.ledger[name], 8.0 * force * (moved + place), 1e-9), name
 
 
 def assert_same_dashpots(one: Record, other: Record) -> None:
     for names in (("e_one", "e_mixed", "e_two"), ("h_one", "h_mixed", "h_two")):
         numbers = np.array([[operator[name] for name in names] for operator in (one, other)])
-        assert numbers[0] == pytest.approx(numbers[1], rel=1e-6, abs=1e-9 * np.abs(numbers).max())
+        assert is_near(numbers[0], numbers[1], 1e-9 * np.abs(numbers).max(), 1e-6)
 
 
 def tip(angle: float) -> float:
@@ -232,7 +238,7 @@ def test_corner_of_a_polygon_beyond_the_end_of_its_face_is_not_steady(
     assert kind == (CHANGED if changes else TOUCHING)
 
 
-TRIES = 1000 if config.DISABLE_JIT else 4000
+TRIES = 1000 if config.DISABLE_JIT else 2000
 SIX = [[np.cos(angle), np.sin(angle)] for angle in np.arange(6) * np.pi / 3.0]
 SHARP = [[-1.0, -0.2], [1.0, -0.2], [-0.8, 0.9]]
 QUADRANGLE = [[-1.0, -0.5], [1.2, -0.7], [0.6, 0.8], [-0.9, 0.4]]
