@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.analysis import compare, evidence, metrics
+from blocksim.analysis import QUANTITIES, compare, evidence, metrics
 from blocksim.cli import command_line, output
 from blocksim.errors import ExitCode
 from blocksim.options import Option
@@ -121,7 +121,8 @@ def verdict_lines(comparison: compare.Comparison) -> list[str]:
         if row.verdict == compare.Verdict.OUTSIDE:
             least = 10.0**-DIGITS  # a distance is never shown as zero
             distance = f"less than {least:g}" if row.distance < least else output.number(row.distance, DIGITS)
-            outside.append(f"outside: {row.quantity} of block {row.block} by {distance} {row.unit}")
+            whose = "block" if row.quantity in QUANTITIES else "probe"
+            outside.append(f"outside: {row.quantity} of {whose} {row.block} by {distance} {row.unit}")
     return [*comparison.messages, *(outside or ["all inside"])]
 
 

@@ -132,9 +132,8 @@ class StaticAnswer(RangeAnswer, frozen=True):
 def static_limit(scenario: Source, options: limit_plan.LimitOptions) -> StaticAnswer:
     """Find up to which value of a key a structure can be in equilibrium: a bound, no structure stands beyond it.
 
-    Of the options those of the range, `tolerance`, `scan` and the folder matter. Raises ScenarioError,
-    InvalidInputError, also where something else acts than loads that are the same from time zero on, and
-    OutputExistsError where the folder is not free.
+    Raises ScenarioError; InvalidInputError for options of runs (`stands`, `stiffer`, executors), and where something
+    else acts than loads that are the same from time zero on; OutputExistsError where the folder is not free.
     """
     return find_static(limit_plan.read_limit(document_of(scenario), options), options)
 
@@ -154,12 +153,19 @@ def bound_of(plan: LimitPlan) -> StaticLimit | None:
 
 def find_static(plan: LimitPlan, options: limit_plan.LimitOptions) -> StaticAnswer:
     """Search as planned; see `static_limit`."""
+    of_runs = [name for name in OF_RUNS if getattr(options, name) != getattr(limit_plan.LimitOptions, name)]
+    if of_runs:
+        flags = " and ".join(f"--{name}" for name in of_runs)
+        raise InvalidInputError(f"statics makes no runs: leave {flags} out")
     found = search_statics(plan)
     base, kind = plan.scenario_at(plan.span.low), StaticAnswer.files
     folder = sweep.make_folder(options.out, base, kind, plan.name, overwrite=options.overwrite)
     answer = StaticAnswer.of(plan, folder, found)
     answer.write()
     return answer
+
+
+OF_RUNS = ("stands", "stiffer", "executor", "jobs", "scheduler")  # options
 
 
 class StaticSearch(NamedTuple):
