@@ -58,7 +58,7 @@ ENDS = {
     "full disk at once": (DENSE, LIMIT.format(1000), 74, TOO_LARGE.format("scenario.toml")),
     "full disk soon": (DENSE, LIMIT.format(100_000), 74, TOO_LARGE.format("run.h5")),
 }
-LONG = ("full disk at once", "full disk soon")
+LONG = ("full disk at once", "full disk soon", "import of a run")
 
 
 @pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.long if one in LONG else ()) for one in ENDS])

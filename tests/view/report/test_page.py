@@ -8,8 +8,6 @@ from hashlib import sha256
 from html import unescape
 from pathlib import Path
 
-import pytest
-
 from blocksim.simulation.balance import EnergyLedger
 from blocksim.simulation.observables import Movement, Response
 from blocksim.view.report.page import labels, page_text
@@ -19,22 +17,23 @@ from tests.view.report.folders import write_run
 HOSTILE = ("<script>alert(1)</script>", "</script><img src=x>", "<!--<script>", "\u202egnp", "{{ 7*7 }}", "x" * 3000)
 
 
-@pytest.mark.parametrize("name", HOSTILE)
-def test_hostile_names_stay_text(tmp_path: Path, name: str) -> None:
+def test_hostile_names_stay_text(tmp_path: Path) -> None:
     write_run(tmp_path / "run", count=2)
     stored = read_folder(tmp_path / "run")
     assert stored.frames is not None
-    frames = replace(stored.frames, names=(name, "2", "3"))
-    run = replace(stored, frames=frames, scenario_text=name, problems=(name,))
-    table = CaseTable(Path(name[:100]), ("case", "status", f"{name}.x_mm"), ((name, name, "1.0"),))
-    subjects = [replace(run_subject("a", run), name=name), sweep_subject("b", table, None, {})]
+    table = CaseTable(Path("t"), ("case", "status", "1.x_mm"), (("1", "1", "1.0"),))
     clean = page_text([run_subject("a", stored), sweep_subject("b", table, None, {})], title="", version="0")
-    text = page_text(subjects, title=name, version="0")
     tags = r"<(?:script|img|!--)"
-    assert len(re.findall(tags, text)) == len(re.findall(tags, clean))
-    found = re.search(r'id="a-data">(.*?)</script>', text, re.DOTALL)
-    assert found
-    assert json.loads(found[1])["frames"]["names"][0] == name
+    for name in HOSTILE:
+        frames = replace(stored.frames, names=(name, "2", "3"))
+        run = replace(stored, frames=frames, scenario_text=name, problems=(name,))
+        table = CaseTable(Path(name[:100]), ("case", "status", f"{name}.x_mm"), ((name, name, "1.0"),))
+        subjects = [replace(run_subject("a", run), name=name), sweep_subject("b", table, None, {})]
+        text = page_text(subjects, title=name, version="0")
+        assert len(re.findall(tags, text)) == len(re.findall(tags, clean)), name
+        found = re.search(r'id="a-data">(.*?)</script>', text, re.DOTALL)
+        assert found
+        assert json.loads(found[1])["frames"]["names"][0] == name
 
 
 def test_page_runs_nothing_but_its_own_script_and_style(tmp_path: Path) -> None:
