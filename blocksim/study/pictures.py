@@ -352,7 +352,7 @@ def draw_run(find: Callable[[], run_folder.StoredRun], options: PlotOptions) -> 
     asked = scene.PictureOptions(
         scenario.name,
         measured,
-        run_data.support_of(scenario, stored.events),
+        run_data.support_of(scenario, stored.events, stored.probes() if scenario.actuators else {}),
         forces=options.forces,
         times=options.times,
         count=options.frames,
@@ -418,7 +418,8 @@ def animate_run(stored: run_folder.StoredRun, path: Path, options: AnimateOption
     scenario = stored.scenario
     paint = paints.paint_of(options.colour, stored.frames, scenario)
     look = animation.Look(options.width, options.trails, scenario.name, options.forces, paint)
-    support, pace = run_data.support_of(scenario, stored.events), animation.Pace(options.speed, options.fps)
+    support = run_data.support_of(scenario, stored.events, stored.probes() if scenario.actuators else {})
+    pace = animation.Pace(options.speed, options.fps)
     return animation.draw_animation(stored.frames, path, pace, look, support, options.on_picture)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from blocksim.errors import InvalidInputError
+from blocksim.scenario.models.actuators import Actuator
 from blocksim.scenario.models.loads import Force, Gravity, Horizontal, Moment, Pressure
 from blocksim.simulation.trajectory import Contacts, Frames, Rows, forces_on_a
 from blocksim.view import style
@@ -264,11 +265,12 @@ def _loads_and_speeds(poses: _Poses, support: Support) -> Iterator[Arrows]:
     """
     for one in support.loads:
         load, factor = one.load, one.values(poses.time)[:, None]
-        if isinstance(load, Force):
+        if isinstance(load, Force | Actuator):
+            size = factor * (load.magnitude if isinstance(load, Force) else 1.0)
             way = np.array([[np.cos(load.direction), np.sin(load.direction)]])
-            ways = poses.to_scene(one.body, way) if load.axes == "body" else way[None]
+            ways = poses.to_scene(one.body, way) if getattr(load, "axes", "world") == "body" else way[None]
             arms = poses.to_scene(one.body, np.array([load.point]))
-            yield poses.arrows(FORCE, one.body, arms, (load.magnitude * factor)[..., None] * ways)
+            yield poses.arrows(FORCE, one.body, arms, size[..., None] * ways)
         elif isinstance(load, Pressure):
             is_water = load.water_level is not None
             begin, end, normal = map(np.array, one.edge)

@@ -1,20 +1,24 @@
 """A run as its pictures need it: frames and the choice among them, support, loads, and what of the plane is shown."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import PlacedSegment, Scenario, events, geometry, open_faces, place_bodies, placement
-from blocksim.scenario.models.loads import AnyLoad, Stretch, stretches_of
+from blocksim.scenario.models.actuators import Actuator
+from blocksim.scenario.models.loads import AnyLoad, Stretch, joined, stretches_of
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.simulation.results import EventRecord
 from blocksim.simulation.trajectory import Frames
 from blocksim.world.systems.blocks import boxes_around
+
+if TYPE_CHECKING:
+    from blocksim.simulation.instruments import ProbeSeries
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -27,9 +31,9 @@ LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
 
 
 class LoadOverTime(NamedTuple):
-    """A load, where it acts, its factor or tilt (rad) over time, and when (s) it ends."""
+    """A load, where it acts, its factor or tilt (rad) over time, or force (N) of an actuator, and when (s) it ends."""
 
-    load: AnyLoad
+    load: AnyLoad | Actuator
     body: int  # -1: all free ones
     edge: geometry.Edge  # m, of a pressure
     stretches: tuple[Stretch, ...]
@@ -186,10 +190,13 @@ def is_fixed(frames: Frames, support: Support) -> Flags:
     return np.array(support.fixed or (False,) * len(frames.names), dtype=bool)
 
 
-def support_of(scenario: Scenario, happened: Sequence[EventRecord] = ()) -> Support:
+def support_of(
+    scenario: Scenario, happened: Sequence[EventRecord] = (), probes: "Mapping[str, ProbeSeries] | None" = None
+) -> Support:
     """Return the support of a scenario's runs, or of one in which these events have happened.
 
-    Of events that wait for rest only a run knows the time: until then it is infinite.
+    Of events that wait for rest only a run knows the time: until then it is infinite. Forces of actuators are those of
+    its `probes`.
     """
     placed = place_bodies(scenario)
     times = [np.inf if event.at is None else event.at for event in scenario.events]
@@ -205,6 +212,10 @@ def support_of(scenario: Scenario, happened: Sequence[EventRecord] = ()) -> Supp
         )
         for one in open_faces.acting_loads(scenario, numbers)
     )
+    for name, jack in zip(events.actuator_names(scenario), scenario.actuators, strict=True):
+        if (series := (probes or {}).get(name)) is not None and len(series):
+            forces = joined(series.time.tolist(), series["force"].tolist())
+            loads += (LoadOverTime(jack, numbers[jack.body], open_faces.NO_FACE, forces, math.inf),)
     return Support(
         profile=scenario.ground.profile or Support.profile,
         walls=placement.wall_segments(scenario),

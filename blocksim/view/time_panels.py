@@ -215,6 +215,13 @@ def panels_of(probe: instruments.ProbeSeries) -> list[TimePanel]:
         energies = energy_groups(probe.columns, np.arange(len(probe)))
         factor, unit = unit_for(float(np.nanmax(np.abs([*energies.values()]), initial=0.0)), "J")
         return [panel("energy", unit, factor, energies)] if energies else []
+    if probe.kind == instruments.ACTUATOR:
+        places = {name: probe[name] for name in ("displacement", "head")}
+        found = [panel("displacement", "mm", MILLIMETRES, places)]
+        for column, base in (("force", "N"), ("work", "J")):
+            factor, unit = unit_for(float(np.nanmax(np.abs(probe[column]), initial=0.0)), base)
+            found.append(panel(column, unit, factor, {column: probe[column]}))
+        return found
     if probe.kind == instruments.POINT:
         moves = any(not np.array_equal(probe[one], probe[f"relative_{one}"]) for one in ("dx", "dy"))
         names = [[f"{'relative_' * moves}{one}{axis}" for axis in "xy"] for one in "dv"]

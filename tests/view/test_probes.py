@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.simulation import simulate_into
+from blocksim.simulation import instruments, simulate_into
+from blocksim.view import run_data
 from blocksim.view.report.page import page_text
 from blocksim.view.report.subjects import read_folder, run_subject
-from blocksim.view.time_panels import draw_probes, panels_of
+from blocksim.view.time_panels import draw_probes, panels_of, probe_picture
 from tests.golden import Golden
+from tests.simulation.test_actuators import pushed
 from tests.simulation.test_probes import scene
 from tests.view.study_drawings import probe
 
@@ -20,6 +22,20 @@ def test_a_moving_support_is_taken_off_the_motion_of_a_point() -> None:
     still.columns["relative_dx"][:], still.columns["relative_dy"][:] = still["dx"], still["dy"]
     assert [*panels_of(still)[0].lines] == ["dx", "dy"]
     assert [*panels_of(probe("point"))[0].lines] == ["relative dx", "relative dy"]
+
+
+@pytest.mark.parametrize("kind", instruments.COLUMNS)
+def test_every_kind_of_probe_has_a_picture(kind: str) -> None:
+    assert all(len(panel.lines) > 0 for panel in panels_of(probe(kind)))
+    assert probe_picture(probe(kind)).startswith(b"\x89PNG")
+
+
+def test_an_actuator_pushes_as_its_record_says() -> None:
+    """Its arrow in pictures, between two samples."""
+    scenario, record = pushed("nonsmooth"), probe("actuator")
+    (jack,) = run_data.support_of(scenario, (), {"jack": record}).loads
+    assert jack.values(np.array([0.15])) == pytest.approx(0.5 * (record["force"][1] + record["force"][2]))
+    assert run_data.support_of(scenario).loads == ()
 
 
 def test_what_cannot_be_drawn_is_told(golden: Golden) -> None:

@@ -1,9 +1,9 @@
 """Data of the player: frames, forces, loads, further systems and surroundings, as text that a page can carry."""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from blocksim.view import arrows, paints, run_data, scene, style
 from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices
 from blocksim.world.systems.blocks import are_removed, distinct
 from blocksim.world.systems.system import Track
+
+if TYPE_CHECKING:
+    from blocksim.simulation.instruments import ProbeSeries
 
 EXACT_VALUES = 200_000  # up to so many values are kept as 32-bit floats
 LEVELS = 65_535  # steps of a rounded value
@@ -120,13 +123,17 @@ MOST_ARROWS = 200_000  # in all frames of a run
 
 
 def pack_loads(
-    frames: trajectory.Frames, scenario: Scenario, kept: Indices, happened: Sequence[results.EventRecord]
+    frames: trajectory.Frames,
+    scenario: Scenario,
+    kept: Indices,
+    happened: Sequence[results.EventRecord],
+    probes: "Mapping[str, ProbeSeries]",
 ) -> tuple[dict[str, Any], Extent, list[str]] | None:
     """Return what acts from outside in some frames, the extent that holds it, and notes; None where nothing does.
 
     The support's displacement is told beside loads on all blocks, as level ground looks the same wherever it is.
     """
-    support = run_data.support_of(scenario, happened)
+    support = run_data.support_of(scenario, happened, probes)
     acts, extent = arrows.actions_on(frames, kept, support), run_data.extent_of(frames, kept, support)
     room, length = arrows.with_room(extent, acts)
     marks = [[[mark.text, *mark.way] for mark in row] for row in acts.marks]

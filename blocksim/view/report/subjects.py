@@ -278,7 +278,7 @@ def _player_data(
         return None, [], [str(error)], None
     happened = () if run.summary is None else run.summary.events
     drawn = scene_data(frames, scenario, kept, happened)
-    forces, found = pack_forces(frames, kept, drawn["tilt"]), pack_loads(frames, scenario, kept, happened)
+    forces, found = pack_forces(frames, kept, drawn["tilt"]), pack_loads(frames, scenario, kept, happened, run.probes)
     notes, loads = [*notes, NO_FORCES if forces is None else forces["told"]], None
     if found is not None:
         loads, extent, more = found
