@@ -84,12 +84,16 @@ def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
 
 def faces_under(scenario: Scenario, load: Pressure) -> list[OpenFace]:
     """Return the faces on which a pressure acts; those of a structure in the order of its bodies."""
-    placed, origins = placement.placement_of(scenario)[1:]
+    _, placed, origins, sides = placement.placement_of(scenario)
     if load.structure is None:
         number = next(number for number, body in enumerate(placed) if body.name == load.body)
         return [OpenFace(number, face_of(placed[number].corners, load.face) or NO_FACE)]
-    own = [number for number, origin in enumerate(origins) if origin == ("structures", load.structure - 1)]
-    return [*_open_faces(scenario, placed, own, side_of(scenario, load))] if own else []
+    side = load.structure, side_of(scenario, load)
+    if side not in sides:
+        own = [number for number, origin in enumerate(origins) if origin == ("structures", load.structure - 1)]
+        sides[side] = [*_open_faces(scenario, placed, own, side[1])] if own else []
+    faces: list[OpenFace] = sides[side]
+    return faces
 
 
 def side_of(scenario: Scenario, load: Pressure) -> float:
@@ -99,7 +103,7 @@ def side_of(scenario: Scenario, load: Pressure) -> float:
     """
     if load.face not in (BACK, FRONT):
         return NORMALS[str(load.face)][0]
-    placed, origins = placement.placement_of(scenario)[1:]
+    _, placed, origins, _ = placement.placement_of(scenario)
     of_structure = ("structures", (load.structure or 0) - 1)
     own = [body.x for body, origin in zip(placed, origins, strict=True) if origin == of_structure]
     middle = 0.5 * (min(own) + max(own)) if own else 0.0

@@ -4,7 +4,7 @@ import math
 import weakref
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +115,7 @@ class Placement(NamedTuple):
     scenario: weakref.ref[Scenario]
     bodies: tuple[PlacedBody, ...]
     origins: list[overrides.KeyPath]  # of every body the structure or single body that it comes from
+    sides: dict[Any, Any]  # of structures, what is open there as soon as it is known: open_faces.py
 
 
 _latest: list[Placement] = []  # at most one, for as long as its scenario lives: a million bodies take seconds to place
@@ -164,7 +165,7 @@ def placement_of(scenario: Scenario) -> Placement:
             body = body._replace(driven=is_driven, freed=name in freed, guided=spec.guide != "none")
         bodies.append(body)
         origins.append(("bodies", number))
-    _latest[:] = [Placement(weakref.ref(scenario, lambda _: _latest.clear()), tuple(bodies), origins)]
+    _latest[:] = [Placement(weakref.ref(scenario, lambda _: _latest.clear()), tuple(bodies), origins, {})]
     return _latest[0]
 
 
