@@ -13,7 +13,7 @@ import typer
 
 from blocksim.cli import command_line, compare, output, prepare, progress
 from blocksim.options import Option
-from blocksim.simulation import Result, files, loop, observables, trajectory
+from blocksim.simulation import Result, files, loop, observables, rest_state, trajectory
 from blocksim.simulation.run import RunCallbacks
 from blocksim.study import compare as judgement, rows, run
 
@@ -59,7 +59,12 @@ def run_command(
             over = time.monotonic() - context.obj
             options = replace(options, precautions=replace(options.precautions, time_over=over))
         with _page(Path(out)) if live else nullcontext():
-            result = run.run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))
+            try:
+                result = run.run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))
+            except rest_state.SettleError as error:
+                raise rest_state.SettleError(
+                    f"{error}; --set start.settle=false runs it from where it is placed"
+                ) from None
     # SIGHUP reports that the terminal is lost
     with nullcontext() if result.status == rows.FINISHED else suppress(OSError):
         screen.show(_report(result))

@@ -32,6 +32,13 @@ def test_folder_of_a_run_that_is_going_on_is_left_alone(blocksim: Command, tmp_p
     assert not any((tmp_path / "out").iterdir())
 
 
+def test_a_scene_that_does_not_settle_is_refused_with_the_key_that_lets_it_fall(blocksim: Command) -> None:
+    blocksim("new", "wall", "wall")
+    answer = blocksim("run", "wall.toml", "--set", "ground.tilt=36 deg")
+    assert answer.code == 76
+    assert answer.err.endswith("; --set start.settle=false runs it from where it is placed\n")
+
+
 def test_long_table_tells_how_many_blocks_it_leaves_out() -> None:
     columns: dict[str, list[object]] = {"block": [*map(str, range(41))]}
     columns |= dict.fromkeys(("x_mm", "y_mm", "rotation_deg"), [0.0] * 41)
