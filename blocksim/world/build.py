@@ -158,12 +158,12 @@ def _divided(layouts: Sequence[Layout], bodies: arrays.Records) -> Iterator[tupl
     """Yield the parts of scenes of one layout, all those of one shape together, and which they are.
 
     What decides the shape by now: how many bodies are large, how many move with the support, how many particles there
-    are, and how many slots a pair has: of corners those of its two bodies, at most.
+    are, and how many slots a pair has: of corners those of its two bodies, at most, up to a whole number of NEAR_PAIR.
     """
     contact, has_springs = layouts[0].scenario.contact, layouts[0].scenario.time.has_springs
     particles: list[arrays.Records] = []
     if contact.model == SURFACE or not has_springs:
-        slots = [max(arrays.SLOTS, 2 * max(one.shapes.sizes)) for one in layouts]
+        slots = [-(-2 * max(one.shapes.sizes) // arrays.SLOTS) * arrays.SLOTS for one in layouts]
     else:
         spacings = [layout.scenario.contact.particle_spacing for layout in layouts]
         particles = [place_particles(one, contact.model, space) for one, space in zip(bodies, spacings, strict=True)]
@@ -306,7 +306,7 @@ def assemble_world(
         **empty_lists(capacity, slots, before),
         particles=parts.particles,
         corners=join_records([one.shapes.table for one in layouts]) if layouts[0].shapes.has_polygons else None,
-        starts=numbers((members, 3 * max(blocks, LEAST_CELLS) + 3), np.uint32),
+        starts=numbers((members, max(blocks, LEAST_CELLS) + 3), np.uint32),
         order=numbers((members, blocks), np.uint32),
         large=numbers(large.shape, np.uint32),
         interactions=interactions.interaction_tables([layout.interactions for layout in layouts]),
@@ -362,7 +362,6 @@ def empty_lists(capacity: int, slots: int, contacts: arrays.Records) -> dict[str
         "contacts": arrays.zeros((*pairs, most), contacts.dtype),
         "candidates": numbers((*pairs, slots), kind),
         "operators": arrays.zeros((*pairs, 2), arrays.OPERATOR),
-        "near_pairs": arrays.zeros(pairs, arrays.NEAR_PAIR),
     }
 
 

@@ -55,9 +55,7 @@ def scene_size(bodies: int, pairs: int, slots: int, *, has_particles: bool = Fal
         contacts, candidates = slots * arrays.PARTICLE_CONTACT.itemsize, slots * INDEX
     else:
         contacts, candidates = arrays.CONTACTS * arrays.CONTACT.itemsize, slots
-    pair = (
-        arrays.PAIR.itemsize + arrays.NEAR_PAIR.itemsize + candidates + OPERATORS * arrays.OPERATOR.itemsize + contacts
-    )
+    pair = arrays.PAIR.itemsize + candidates + OPERATORS * arrays.OPERATOR.itemsize + contacts
     work = (slots + 1) * arrays.POINT.itemsize + contacts
     return Size(bodies, pairs, bodies * (arrays.BODY.itemsize + OBJECT_BYTES) + pairs * pair + work)
 

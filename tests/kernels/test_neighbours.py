@@ -11,6 +11,7 @@ from hypothesis import assume, given, strategies as st
 
 from blocksim.kernels.common.arrays import (
     MOTION_PIECE,
+    NEAR_PAIR,
     PAIR,
     Records,
     World,
@@ -274,7 +275,7 @@ def test_every_pair_keeps_its_own_history_wherever_it_moves_in_the_list(
     fill_list(world, old, random)
     before = remembered(world, world.pairs, len(old))
     axes = {(int(pair.a), int(pair.b)): int(pair.axis) for pair in world.pairs[: len(old)]}
-    for near, (a, b) in zip(world.near_pairs, new, strict=False):
+    for near, (a, b) in zip(world.candidates.view(NEAR_PAIR)[:, 0], new, strict=False):
         near.a, near.b = a, b
     assert carry_history(world, len(new)) == len(new)
     after = remembered(world, world.pairs, len(new))

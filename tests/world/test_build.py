@@ -67,7 +67,7 @@ def test_more_room_keeps_what_there_is(model: str) -> None:
     world.ledger[0].friction = 11.0
     wider = with_more_room(world)
     used = world.pairs.size
-    assert wider.pairs.size == wider.near_pairs.size == ceil(GROWTH * used)
+    assert wider.pairs.size == len(wider.candidates) == ceil(GROWTH * used)
     for name in ("pairs", "contacts", "candidates", "operators"):
         old, new = getattr(world, name), getattr(wider, name)
         assert (new[:used] == old).all(), name

@@ -148,12 +148,7 @@ PAIR = record_type(
     "sticking "  # bits of the points that have a dashpot along the tangent
     "slides",  # which way its only contact slides: AHEAD, where a moves ahead of b along the tangent, BACK, or not: 0
 )
-NEAR_PAIR = record_type(
-    "",
-    indices="a b",  # bodies, sorted
-    small="slots",  # number of candidates
-    flags="axis touches",  # that of the pair in the list before; flag: it had contacts
-)
+NEAR_PAIR = np.dtype((np.record, record_type("", indices="a b")))  # bodies, sorted
 CONTACT = record_type(
     "spring depth "  # m: shear spring, overlap
     "normal_force shear_force",  # N: pushing apart, resisting slip
@@ -276,14 +271,14 @@ class World(NamedTuple):
     bodies: Records  # (n + 1,) BODY, the ground last
     pairs: Records  # (p,) PAIR
     contacts: Records  # (p, c) CONTACT or PARTICLE_CONTACT; the first `active` of a pair, in the order of their slots
-    candidates: Any  # (p, s) uint8 or uint32: slots within the skin of the other body, sorted, `near` of them
+    # (p, s) uint8 or uint32: slots within the skin of the other body, sorted, `near` of them; while pairs are listed
+    candidates: Any  # each row is a NEAR_PAIR instead
     operators: Records  # (p, 2) OPERATOR, dashpots along the normals and the tangents
     interactions: Records  # (k, k) INTERACTION
     particles: Any  # (q,) PARTICLE, body after body; None, a type of its own, for the surface model
     corners: Any  # (q,) CORNER, shape after shape; None, a type of its own, where all blocks are rectangles
     points: Records  # (s + 1,) POINT, work space of one pair; the last one for contacts that end
-    near_pairs: Records  # (p,) NEAR_PAIR, the list being built
-    starts: Any  # (3 c + 3,) uint32: where cells of the grid, at most 3 c + 1, begin in the order; neighbours.py
+    starts: Any  # (c + 3,) uint32: where cells of the grid, at most c + 1, begin in the order; neighbours.py
     order: Any  # (n,) uint32: bodies cell by cell
     large: Any  # (l,) uint32: bodies too large for the grid, sorted
     action: Records  # (1,) ACTION, work space of one pair

@@ -31,7 +31,6 @@ def member(worlds: arrays.World, m: int) -> arrays.World:
         of_member(worlds.particles, m),
         of_member(worlds.corners, m),
         worlds.points[m],
-        worlds.near_pairs[m],
         worlds.starts[m],
         worlds.order[m],
         worlds.large[m],

@@ -35,59 +35,65 @@ def idle_candidates(pair: arrays.Record) -> int:
 
 @jit.rare_kernel
 def move_pair(world: arrays.World, source: int, target: int) -> None:
-    """Copy a pair that touches, with its contacts and dashpots, from one place in the list to another."""
+    """Copy a pair, if it touches with its contacts and dashpots, from one place in the list to another."""
     world.pairs[target] = world.pairs[source]
     for k in range(world.pairs[source].active):
         world.contacts[target, k] = world.contacts[source, k]
-    world.operators[target, arrays.NORMAL] = world.operators[source, arrays.NORMAL]
-    world.operators[target, arrays.SHEAR] = world.operators[source, arrays.SHEAR]
+    if world.pairs[source].active > 0:
+        world.operators[target, arrays.NORMAL] = world.operators[source, arrays.NORMAL]
+        world.operators[target, arrays.SHEAR] = world.operators[source, arrays.SHEAR]
 
 
 @jit.rare_kernel
 def carry_history(world: arrays.World, count: int) -> int:
     """Make the pairs of the new list, those that touch as they were in the old one; return how many have slots.
 
-    Nothing of these changes, so that the motion does not depend on when lists are made. They move to the front first,
-    then each to its place, as there is no memory for two lists of a large scene: both are sorted, so none is overtaken.
+    Nothing of these changes, so that the motion does not depend on when lists are made. All that are in both lists move
+    to the front first, then each to its place, as there is no memory for two lists of a large scene: both are sorted,
+    so none is overtaken.
     """
     pairs, reach = world.pairs, list_reach(world.controls[0])
+    listed = world.candidates.view(arrays.NEAR_PAIR)[:, 0]
     old_count = world.clock[0].pair_count
-    q = kept = used = 0
+    q = kept = 0
     for p in range(count):
-        a, b = world.near_pairs[p].a, world.near_pairs[p].b
-        slots = near_slots(world, a, b, reach, world.candidates[used], world.particles)
-        if slots == 0:
-            continue
+        a, b = listed[p].a, listed[p].b
         while q < old_count and (pairs[q].a < a or (pairs[q].a == a and pairs[q].b < b)):
             q += 1
-        is_old = q < old_count and pairs[q].a == a and pairs[q].b == b
-        near = world.near_pairs[used]
-        near.a, near.b, near.slots = a, b, slots
-        near.axis = pairs[q].axis if is_old else 0
-        near.touches = is_old and pairs[q].active > 0
-        if near.touches:
+        if q < old_count and pairs[q].a == a and pairs[q].b == b:
             move_pair(world, q, kept)
             kept += 1
-        used += 1
-    for p in range(used - 1, -1, -1):
-        near, pair = world.near_pairs[p], pairs[p]
-        if near.touches:
+    for p in range(count - 1, -1, -1):
+        a, b, axis = listed[p].a, listed[p].b, 0
+        is_old = kept > 0 and pairs[kept - 1].a == a and pairs[kept - 1].b == b
+        if is_old:
             kept -= 1
+            axis = pairs[kept].axis
             move_pair(world, kept, p)
-        else:
+        if not is_old or pairs[p].active == 0:
+            pair = pairs[p]
             pairs[p] = NEW_PAIR[0]
-            pair.a, pair.b, pair.axis = near.a, near.b, near.axis
-            pair.limit = overlap_limit(world.bodies[near.a], world.bodies[near.b], world.controls[0].max_overlap)
-        pair.near = near.slots
-        pair.idle = idle_candidates(pair)
+            pair.a, pair.b, pair.axis = a, b, axis
+            pair.limit = overlap_limit(world.bodies[a], world.bodies[b], world.controls[0].max_overlap)
+        pairs[p].near = near_slots(world, a, b, reach, world.candidates[p], world.particles)
+        pairs[p].idle = idle_candidates(pairs[p])
+    used = 0
+    for p in range(count):
+        if pairs[p].near > 0:
+            if used < p:
+                move_pair(world, p, used)
+                for k in range(pairs[p].near):
+                    world.candidates[used, k] = world.candidates[p, k]
+            used += 1
     return used
 
 
 @jit.rare_kernel
 def rebuild_pairs(world: arrays.World) -> bool:
-    """Rebuild the pair list; return False, with the old list untouched, where it does not fit."""
-    count = neighbours.list_pairs(world, world.near_pairs, None, list_reach(world.controls[0]), True)
-    if count > world.near_pairs.size:
+    """Rebuild the pair list; return False, with the old list untouched but for candidates, where it does not fit."""
+    listed = world.candidates.view(arrays.NEAR_PAIR)[:, 0]
+    count = neighbours.list_pairs(world, listed, None, list_reach(world.controls[0]), True)
+    if count > world.pairs.size:
         return False
     count = carry_history(world, count)
     neighbours.note_places(world.bodies)
