@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.errors import StoppedEarlyError
-from blocksim.scenario import Scenario, document_of
+from blocksim.scenario import Scenario, document_of, scenario_from_mapping
 from blocksim.study.criterion import DEFAULT, read_criterion
 from blocksim.study.executors import Batch, Execution, Rounds, RunSetting, Task
-from blocksim.study.limit import find_limit
+from blocksim.study.limit import find_limit, rest_acceleration
 from blocksim.study.limit_answer import LimitAnswer
 from blocksim.study.limit_plan import Change, LimitOptions, SearchRange, changes_in, next_near, next_values, read_limit
 from blocksim.study.manifest import MANIFEST
@@ -254,3 +254,10 @@ def test_springs_of_hertz_give_way_by_another_power_and_a_step_by_hand_is_shorte
     assert len({one.contact.stiffness_scale for one in noting.asked}) > 1
     for one in noting.asked:
         assert float(one.time.step) * math.sqrt(one.contact.stiffness_scale) == pytest.approx(1e-6)
+
+
+@pytest.mark.parametrize("gravity", [0.5, 9.81])
+def test_what_rest_cannot_tell_from_falling_is_an_acceleration_under_any_gravity(gravity: float) -> None:
+    one = scenario_from_mapping({**block_on_a_slope((0.1, 0.1)), "gravity": gravity, "start": {"settle": False}})
+    assert 0.0 < rest_acceleration(one, None) <= 1e-2
+    assert rest_acceleration(one.model_copy(update={"gravity": 0.0}), None) == 0.0

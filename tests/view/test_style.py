@@ -67,3 +67,8 @@ def test_long_names_are_broken_where_they_read_best_and_no_letter_is_lost() -> N
     assert "10.25 mm" in break_lines("structures.0.overlap − 10.25 mm (µm)", 0.65)
     assert break_lines("x" * 100, 0.5)[0].endswith("…")
     assert break_lines("", 1.0) == [""]
+
+
+@pytest.mark.parametrize(("letters", "text"), [(4, "mass"), (3, "ma…")])
+def test_a_name_that_just_fits_is_not_cut(letters: int, text: str) -> None:
+    assert shorten("mass", letters) == text
