@@ -73,6 +73,8 @@ def test_a_scenario_shows_its_start_with_soil_and_its_motion() -> None:
     assert pulse.plot("motion").figure is not None
     with pytest.raises(InvalidInputError, match="run it for others"):
         pulse.plot("strip")
+    with pytest.raises(InvalidInputError, match="pulse is in memory only"):
+        blocksim.plot(pulse)  # type: ignore[call-overload]
     with pytest.raises(InvalidInputError, match="run the scenario first"):
         pulse.report()
 

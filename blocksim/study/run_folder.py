@@ -31,15 +31,16 @@ Place = Path | str | HasFolder
 
 
 def folder_of(place: Place) -> Path:
-    """Return where a run or a study lies. Raises InvalidInputError for a result that was not kept."""
+    """Return where a run or a study lies. Raises InvalidInputError for a scenario, and a result not kept."""
     if isinstance(place, Path | str):
         return Path(place)
-    if place.folder is None:
+    folder = getattr(place, "folder", None)  # a scenario has none
+    if folder is None:
         name = getattr(place, "name", "run")
         how = "run it with out=FOLDER to store what pictures need, or use its own plot, animate and report"
-        message = f"{name}: this result is in memory only; {how}"
+        message = f"{name} is in memory only; {how}"
         raise InvalidInputError(message)
-    return place.folder
+    return Path(folder)
 
 
 def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Path:
