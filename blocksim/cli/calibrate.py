@@ -20,8 +20,8 @@ def calibrate_command(
     Maximises the probability that a run is inside all measured ranges (as in compare) while the other inputs scatter as
     stated, not the agreement of one run. Writes the scenario with the fitted values and where they come from
     in [provenance]. Every trial is kept as it ends; a search that was stopped continues with --resume. Needs the extra
-    blocksim[study]. Exit code 1: nothing inside all ranges was found. The search then minimises the distance to
-    the ranges, and the file holds the nearest values. The example takes the scatter from [sweep], as in
+    blocksim[study]. Where no trial is inside all ranges the search minimises the distance to them, the file holds
+    the nearest values, and the exit code is 1. The example takes the scatter from [sweep], as in
     "structures.0.overlap" = { mean = "10 mm", sd = "0.3 mm" }; --scatter "structures.0.overlap=10 mm+-0.3 mm" says the
     same.
 

@@ -32,12 +32,12 @@ def capacity_command(
     settings: command_line.Settings = None,
     screen: command_line.Screen,
 ) -> command_line.Report:
-    """Find peak force, stiffness and softening of what actuators move.
+    """Find peak force, stiffness and softening under actuators.
 
-    A line an actuator and direction (push is along it): peak of its force, displacement of its point there and where
-    the force has fallen to 0.8 of the peak, secant stiffness between 0.15 and 0.4 of the peak (with springs), work done
-    on the structure by the end, and the force beyond which statics knows no equilibrium of the structure as it is at
-    the start. A run that was not slow is warned of.
+    One line for each actuator and direction (push is along it): peak of its force, displacement of its point there and
+    where the force has fallen to 0.8 of the peak, secant stiffness between 0.15 and 0.4 of the peak (with springs),
+    work done on the structure by the end, and the force beyond which statics finds no equilibrium of the structure as
+    it is at the start. A run that was not quasi-static gives a warning.
 
     Picture: blocksim plot RUN --kind capacity. Curves: probe-NAME.csv in the run's folder.
 

@@ -107,7 +107,7 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
     "check": "Validate a scenario and summarise it.",
     "sweep": "Run a scenario many times with some keys varied.",
     "limit": "Find the critical value of a parameter (collapse threshold).",
-    "capacity": "Find peak force and softening of what actuators move.",
+    "capacity": "Find peak force and softening under actuators.",
     "fragility": "Find the probability of collapse over an intensity.",
     "calibrate": "Fit inputs to measured repeats, within their priors.",
     "sensitivity": "Rank the inputs by their effect on final positions.",

@@ -15,8 +15,8 @@ from blocksim.simulation.schemes import kernels_of
 from blocksim.study import answer, criterion, fragility, limit, limit_answer, limit_plan, rows
 
 AT_ONCE = (
-    "start.settle = false: loads that come at once shift limits of arches and walls by 0.2 to 4 %; leave it out, and "
-    "every run begins at rest"
+    "start.settle = false: loads that are applied suddenly shift limits of arches and walls by 0.2 to 4 %; leave it "
+    "out, and every run begins at rest"
 )
 
 

@@ -29,7 +29,7 @@ def sensitivity_command(
     """Rank the inputs by their effect on final positions.
 
     The results are all measured quantities (without an experiment, x of the blocks) and the class of the outcome:
-    rotations rounded to quarter turns. Blocks of the design with a failed run are left out and counted.
+    rotations rounded to quarter turns. Trajectories or base samples with a failed run are left out and counted.
     Needs the extra blocksim[study].
 
     Example: blocksim sensitivity scenarios/slide.toml --vary gravity=9.7:9.9
