@@ -212,7 +212,7 @@ class Pressure(VaryingLoad):
 
     kind: Literal["pressure"] = setting("kind of load")
     body: str | None = setting("the name of the body that it acts on; give this or structure", None)
-    structure: Annotated[int, Field(ge=1)] | None = setting(
+    structure: Annotated[int, base.Whole(1, MAX_ROWS)] | None = setting(
         "the number of the structure that it acts on, 1 for the first; give this or body", None
     )
     face: Face = setting(
