@@ -136,7 +136,8 @@ def test_the_system_s_ffmpeg_writes_mp4_where_the_package_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = pytest.importorskip("imageio_ffmpeg", reason="no ffmpeg to stand for the system's")
-    ffmpeg_of(tmp_path, monkeypatch).symlink_to(package.get_ffmpeg_exe())
+    program = package.get_ffmpeg_exe()  # before the package is missing
+    ffmpeg_of(tmp_path, monkeypatch).symlink_to(program)
     draw_animation(toppling(2), tmp_path / "film.mp4", FAST, SMALL)
     written, seconds = package.count_frames_and_secs(str(tmp_path / "film.mp4"))
     assert (written, seconds) == (6 + 15, pytest.approx(2.1, abs=0.01))
