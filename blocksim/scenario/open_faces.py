@@ -25,32 +25,32 @@ AS_NEAR = 1e-6
 """Difference of cosines up to which two faces point into a direction as much as one another."""
 Floats = NDArray[np.float64]
 Interval = tuple[float, float]
-
-
-class OpenFace(NamedTuple):
-    """A face, or a part of one, on which a pressure acts: the number of its body, and an edge along its axes (m)."""
-
-    body: int
-    edge: geometry.Edge
+OpenFace = tuple[int, geometry.Edge]
+"""A face, or a part of one, on which a pressure acts: the number of its body, and an edge along its axes (m)."""
+ALL = -1
+"""In place of the number of a body."""
 
 
 class ActingLoad(NamedTuple):
-    """A load as it acts on one body (-1: on all free ones); of a pressure with the edge (m) that it is on."""
+    """A load as it acts on one body, or on ALL free ones; of a pressure with the edge (m) that it is on."""
 
     load: AnyLoad
-    body: int = -1
+    body: int = ALL
     edge: geometry.Edge = NO_FACE
 
 
 def acting_loads(scenario: Scenario, numbers: Mapping[str, int]) -> Iterator[ActingLoad]:
     """Yield the loads of a scenario in order, those on sides of structures once a face; `numbers` of bodies by name."""
     for load in scenario.loads:
-        if isinstance(load, Pressure):
-            yield from (ActingLoad(load, *one) for one in faces_under(scenario, load))
-        elif isinstance(load, OnBody):
-            yield ActingLoad(load, numbers[str(load.body)])
-        else:
+        if not isinstance(load, OnBody):
             yield ActingLoad(load)
+        elif load.body is None:
+            yield from (ActingLoad(load, *one) for one in faces_under(scenario, load))
+        else:
+            number, edge = numbers[load.body], NO_FACE
+            if isinstance(load, Pressure):
+                edge = face_of(placement.place_bodies(scenario)[number].corners, load.face) or NO_FACE
+            yield ActingLoad(load, number, edge)
 
 
 def face_of(corners: Sequence[geometry.Corner], face: Face) -> geometry.Edge | None:
@@ -83,14 +83,12 @@ def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
 
 
 def faces_under(scenario: Scenario, load: Pressure) -> list[OpenFace]:
-    """Return the faces on which a pressure acts; those of a structure in the order of its bodies."""
+    """Return the faces of a structure on which a pressure acts, in the order of its bodies."""
     _, placed, origins, sides = placement.placement_of(scenario)
-    if load.structure is None:
-        number = next(number for number, body in enumerate(placed) if body.name == load.body)
-        return [OpenFace(number, face_of(placed[number].corners, load.face) or NO_FACE)]
-    side = load.structure, side_of(scenario, load)
+    structure = load.structure or 0
+    side = structure, side_of(scenario, load)
     if side not in sides:
-        own = [number for number, origin in enumerate(origins) if origin == ("structures", load.structure - 1)]
+        own = [number for number, origin in enumerate(origins) if origin == ("structures", structure - 1)]
         sides[side] = [*_open_faces(scenario, placed, own, side[1])] if own else []
     faces: list[OpenFace] = sides[side]
     return faces
@@ -185,7 +183,7 @@ def _open_faces(
                     (begin[0] + share * (end[0] - begin[0]), begin[1] + share * (end[1] - begin[1]))
                     for share in (low / size, high / size)
                 ]
-                yield OpenFace(number, (min(ends), max(ends), normal))
+                yield number, (min(ends), max(ends), normal)
 
 
 def _gaps(covered: Sequence[Interval], size: float) -> Iterator[Interval]:

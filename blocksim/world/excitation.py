@@ -15,7 +15,6 @@ from blocksim.scenario.models import actuators, loads
 
 COEFFICIENTS = ("c0", "c1", "c2", "c3")
 STANDSTILL = arrays.zeros(1, arrays.MOTION_PIECE)
-ALL = -1  # bodies on which a load acts
 
 
 class LoadArrays(NamedTuple):
@@ -34,7 +33,7 @@ def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
     acting = [*open_faces.acting_loads(scenario, numbers)]
     records = arrays.zeros(len(acting) + len(scenario.actuators), arrays.LOAD)
     rows: list[loads.Stretch] = []
-    pushes, end = {ALL: 0.0}, 0.0  # by body
+    pushes, end = {open_faces.ALL: 0.0}, 0.0  # by body
     for record, one in zip(records, acting, strict=False):
         load = one.load
         stretches = loads.stretches_of(load, scenario.ground.tilt)
@@ -50,7 +49,7 @@ def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
         rows += [part._replace(value=level * part.value, rate=level * part.rate) for part in stretches]
         pushes[one.body] = pushes.get(one.body, 0.0) + own
         end = max(end, stretches[-1].start)
-    push = pushes.pop(ALL) + max(pushes.values(), default=0.0)
+    push = pushes.pop(open_faces.ALL) + max(pushes.values(), default=0.0)
     for record, actuator in zip(records[len(acting) :], scenario.actuators, strict=True):
         path, body = actuators.stretches_of(actuator.displacement), placed[numbers[actuator.body]]
         record.kind, record.body, (record.x, record.y) = arrays.LOAD_ACTUATOR, numbers[actuator.body], actuator.point
