@@ -65,24 +65,6 @@ def test_both_directions_are_judged_where_both_were_measured_and_simulated(tmp_p
     assert (back.simulated, back.n, back.verdict) == (3.0, 1, Verdict.INSIDE)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("probe,replicate,displacement,force_kN\njack,1,0,0\n", "'displacement' does not end in its unit"),
-        ("probe,replicate,displacement_mm,force_apples\njack,1,0,0\n", "'force_apples' does not end in its unit"),
-        ("probe,replicate,displacement_mm\njack,1,0\n", "two quantities with their units"),
-        (HEAD, "a header and no rows"),
-        (HEAD + "jack,first,0,0\njack,1,1,1\n", "'first' is not a repeat number"),
-        (HEAD + "jack,1,0,0\njack,1,1,2 kN\n", "'2 kN' is not a number"),
-        (HEAD + "jack,1,0,0\n", "a single point"),
-    ],
-)
-def test_a_wrong_table_of_curves_is_refused_where_it_is_wrong(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(InvalidInputError, match=message) as found:
-        load_curves(table(tmp_path, text))
-    assert "curves.csv:" in str(found.value)
-
-
 def test_probes_and_columns_that_a_run_lacks_are_named(tmp_path: Path) -> None:
     measured = load_curves(table(tmp_path, HEAD + RISE))
     with pytest.raises(InvalidInputError, match="unknown probe 'jack', did you mean 'jakc'"):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from blocksim.analysis.curves import load_curves
 from blocksim.analysis.experiment import ExperimentTable, load_properties, load_table
 from blocksim.errors import InvalidInputError
 from tests.golden import Golden, read
@@ -102,12 +103,25 @@ def test_table_1_and_the_sizes_arrive_in_si() -> None:
     )
 
 
+SPOILT = {
+    "nothing in it": b"",
+    "null characters": b"block\0\n",
+    "terminal codes": f"{HEADER}1,x,\x1b[31mred,1,1\n".encode(),
+    "flood of mistakes": (HEADER + "1,x,kg,1,1\n" * 50).encode(),
+    "UTF-16": HEADER.encode("utf-16"),
+    "huge line": (HEADER + "1,x,mm,1," + "9" * 100_000).encode(),
+    "huge file": (HEADER + "1,x,mm,1,16\n" * 90_000).encode(),
+}
+
+
 def test_broken_tables_are_explained_where_they_are_broken(
     golden: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for name, text in read(Path(__file__).with_name("broken.txt")).items():
-        load = load_properties if text.startswith("property") else load_table
+    broken = {name: f"{text}\n".encode() for name, text in read(Path(__file__).with_name("broken.txt")).items()}
+    for name, content in (broken | SPOILT).items():
+        load = {b"prop": load_properties, b"prob": load_curves}.get(content[:4], load_table)
+        Path("table.csv").write_bytes(content)
         with pytest.raises(InvalidInputError) as caught:
-            load(written(tmp_path, text + "\n").name)
+            load(Path("table.csv"))
         golden(str(caught.value), name)

@@ -55,11 +55,6 @@ def data_of(**tables: object) -> dict[str, Any]:
 
 
 @pytest.fixture
-def valid_text() -> str:
-    return VALID
-
-
-@pytest.fixture
 def refusal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Refusal:
     """Load a scenario that must be refused: exit code and message. Nothing may be written meanwhile."""
     monkeypatch.chdir(tmp_path)
@@ -82,6 +77,14 @@ def edited(edit: Edit, valid: str = VALID) -> str:
     valid = f"{valid.rstrip()}\n"
     assert valid.count(edit[0]) == 1
     return valid.replace(*edit)
+
+
+def read(text: str) -> Edit:
+    """Return the edit that a section of a file stands for: what is added, or what it loses (-) and gets instead (+)."""
+    if text[0] != "-":
+        return text
+    gone, here = ("".join(f"{line[1:]}\n" for line in text.split("\n") if line[0] == sign) for sign in "-+")
+    return gone, here
 
 
 @pytest.fixture

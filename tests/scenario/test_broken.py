@@ -3,7 +3,7 @@
 A section of broken/*.txt is what is added to a valid scenario, the first section or that of conftest.py, or lines that
 it loses (-) and gets in place (+). In broken/structures.txt it is what stands in place of the structure. In
 broken/files/NAME.txt the first is the scenario, the others what stands in the file NAME. broken/settings.toml has
-values of --set, broken/table.toml tables of an experiment.
+values of --set.
 """
 
 import re
@@ -16,11 +16,10 @@ import pytest
 from hypothesis import example, given, strategies as st
 
 from blocksim.analysis.experiment import load_table
-from blocksim.errors import InputMissingError, InvalidInputError, Problem, ScenarioError
+from blocksim.errors import InputMissingError, Problem, ScenarioError
 from blocksim.scenario import Document, load_scenario, scenario_from_mapping, scenario_to_toml
-from blocksim.scenario.overrides import UnfitOverrideError, with_value
 from tests.golden import Golden, parsed
-from tests.scenario.conftest import SCENARIOS, VALID, Edit, Refusal, Refused, edited
+from tests.scenario.conftest import SCENARIOS, VALID, Edit, Refusal, Refused, edited, read
 
 HERE = Path(__file__).parent
 STACK = 'kind = "stack"\nblock = "brick"\ncount = 3\n'
@@ -38,14 +37,6 @@ def edits() -> dict[str, tuple[Edit, str]]:
     return found
 
 
-def read(text: str) -> Edit:
-    """Return the edit that a section stands for."""
-    if text[0] != "-":
-        return text
-    gone, here = ("".join(f"{line[1:]}\n" for line in text.split("\n") if line[0] == sign) for sign in "-+")
-    return gone, here
-
-
 EDITS = edits() | {
     "overlong text": ((WIDTH, f'width = "{"4" * 200} mm"'), VALID),
     "line with a tab and a bell": ((WIDTH, '\twidth = "\x07"'), VALID),
@@ -56,12 +47,6 @@ EDITS = edits() | {
 @pytest.mark.parametrize(("edit", "valid"), EDITS.values(), ids=EDITS)
 def test_scenarios(refused: Refused, edit: Edit, valid: str) -> None:
     refused(edit, valid)
-
-
-@pytest.mark.parametrize("model", ["particles", "kernel"])
-@pytest.mark.parametrize("spacing", ["1e-300 m", "1 nm", "0.5 um"])
-def test_particles_finer_than_a_side_can_have_are_refused(refused: Refused, model: str, spacing: str) -> None:
-    refused(f'[contact]\nmodel = "{model}"\nparticle_spacing = "{spacing}"')  # they overflowed a field of 16 bits
 
 
 def files() -> dict[str, tuple[Edit, str, bytes]]:
@@ -136,18 +121,6 @@ def test_settings(refusal: Refusal, golden: Golden, given: Any) -> None:
     golden(message)
 
 
-@pytest.mark.parametrize(
-    ("loads", "told"),
-    [
-        (({"name": "water"}, {"kind": "moment"}), r"loads has no \"watr\", did you mean 'water'\?"),
-        ((), r'this scenario has no \[\[loads\]\], so no "watr" among them'),
-    ],
-)
-def test_load_of_another_name_is_told_with_those_there_are(loads: tuple[object, ...], told: str) -> None:
-    with pytest.raises(UnfitOverrideError, match=told):
-        with_value({"loads": loads} if loads else {}, ("loads", "watr", "magnitude"), 1.0)
-
-
 def test_files_that_are_not_there_and_data_from_python(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, golden: Golden
 ) -> None:
@@ -166,24 +139,6 @@ def test_files_that_are_not_there_and_data_from_python(
             load_table(tmp_path / name)
         told.append(f"{missing.value}\n")
     golden("\n".join(told))
-
-
-TABLES: dict[str, str | bytes] = tomllib.loads((HERE / "broken" / "table.toml").read_text()) | {
-    "flood of mistakes": "block,quantity,unit,replicate,value\n" + "1,x,kg,1,1\n" * 50,
-    "UTF-16": "block,quantity,unit,replicate,value\n".encode("utf-16"),
-    "huge line": "block,quantity,unit,replicate,value\n1,x,mm,1," + "9" * 100_000 + "\n",
-    "huge file": "block,quantity,unit,replicate,value\n" + "1,x,mm,1,16\n" * 90_000,
-}
-
-
-@pytest.mark.parametrize("content", TABLES.values(), ids=TABLES)
-def test_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, golden: Golden, content: str | bytes) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("table.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(InvalidInputError) as caught:
-        load_table("table.csv")
-    assert "\x1b" not in str(caught.value)
-    golden(str(caught.value))
 
 
 SWEPT = (SCENARIOS / "three_blocks.toml").read_text() + '[sweep]\n"time.end" = [1, 2]\n'

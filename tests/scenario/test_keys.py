@@ -140,10 +140,6 @@ def test_every_value_is_found() -> None:
     check_places(TEXT)
 
 
-def test_every_value_of_a_shipped_scenario_is_found(shipped: Path) -> None:
-    check_places(shipped.read_text())
-
-
 def test_spans(golden: Golden) -> None:
     """A list is first mentioned at its first header."""
     places = locate(TEXT)

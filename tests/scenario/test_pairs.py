@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-from blocksim.scenario import GROUND, Document, Scenario, resolve_pair, scenario_from_mapping
-from blocksim.scenario.models.contact import PairFriction
+from blocksim.scenario import GROUND, Scenario, resolve_pair, scenario_from_mapping
 from tests.golden import Golden
 from tests.scenario.conftest import MATERIAL, data_of
 
@@ -76,33 +75,3 @@ def test_names_with_dots_are_quoted_in_rules() -> None:
     made = scenario(pairs={"S235.JR": {"ground": {"restitution": 0}}})
     pair = resolve_pair(made, "S235.JR", GROUND, ground=True)
     assert (pair.restitution, pair.rules["restitution"]) == (0.0, 'pairs."S235.JR".ground.restitution')
-
-
-PROMOTED = [
-    ({"friction": 0.5}, (0.5, 0.1)),
-    ({"friction": "45 deg"}, (pytest.approx(1.0), 0.1)),
-    ({"friction": {"static": 0.5, "kinetic": 0.4}}, (0.5, 0.1)),
-    ({"restitution": 0.5}, (0.6, 0.1)),
-    (None, (0.6, 0.1)),
-]
-
-
-@pytest.mark.parametrize(("pair", "expected"), PROMOTED)
-@pytest.mark.parametrize("key", ["pairs.oak.ground.friction.kinetic", "pairs.ground.oak.friction.kinetic"])
-def test_setting_the_kinetic_friction_of_a_pair_keeps_the_static_one(
-    pair: dict[str, object] | None, expected: tuple[float, float], key: str
-) -> None:
-    pairs = {} if pair is None else {"pairs": {"oak": {"ground": pair}}}
-    document = Document.from_mapping(scenario_data(friction={"block_ground": 0.6}, **pairs))
-    friction = resolve_pair(document.with_values({key: 0.1}).build(), "oak", GROUND, ground=True).friction
-    assert (friction.static, friction.kinetic) == expected
-
-
-def test_a_pair_that_is_set_in_the_other_order_stays_one_pair() -> None:
-    given = scenario_data() | {"pairs": {"oak": {"steel": {"restitution": 0.1}}}}
-    made = Document.from_mapping(given).with_values({"pairs.steel.oak.restitution": 0.3}).build()
-    assert made.pairs["oak"].keys() == {"steel"}
-    assert resolve_pair(made, "steel", "oak", ground=False).restitution == 0.3
-    new = Document.from_mapping(scenario_data()).with_values({"pairs.oak.steel.friction.kinetic": 0.1}).build()
-    friction = resolve_pair(new, "oak", "steel", ground=False).friction
-    assert friction == PairFriction(static=0.31, kinetic=0.1)  # the default

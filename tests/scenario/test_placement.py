@@ -3,21 +3,20 @@
 import gc
 import math
 import weakref
-from collections.abc import Mapping, Sequence
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_from_mapping
+from blocksim.scenario import Document, Scenario, load_scenario, place_bodies, scenario_from_mapping
 from blocksim.scenario.models.loads import Face
 from blocksim.scenario.open_faces import face_of, strip_before
 from blocksim.scenario.overrides import freeze
 from blocksim.scenario.placement import LENGTH_WITHOUT_BLOCKS, PlacedBody, reference_length, smallest_width
-from blocksim.scenario.start import impossible_starts
-from tests.scenario.conftest import BRICK as OAK_BRICK, MATERIAL, SCENARIOS, data_of
+from tests.golden import parsed
+from tests.scenario.conftest import MATERIAL, SCENARIOS, data_of, edited, read
 
 BRICK = {"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "aluminium"}
 
@@ -105,126 +104,27 @@ def test_lengths_where_there_are_no_blocks_are_finite() -> None:
     assert reference_length(smallest_width([])) == reference_length(-math.inf) == LENGTH_WITHOUT_BLOCKS
 
 
-SLOPE = math.atan(0.5)
+PLACES = parsed((Path(__file__).parent / "valid" / "places.txt").read_text())
 
 
-def bricks_at(bodies: Sequence[Mapping[str, object]], **tables: object) -> dict[str, Any]:
-    return data_of(bodies=[{"block": "brick", **body} for body in bodies], **tables)
+@pytest.mark.parametrize("place", [name for name in PLACES if name != "scenario"])
+def test_a_body_may_be_there_free_or_fixed(place: str) -> None:
+    document = Document.parse(edited(read(PLACES[place]), PLACES["scenario"]))
+    document.build()
+    document.with_values({"bodies.0.fixed": True}).build()
 
 
-def mistakes(data: dict[str, Any]) -> list[str]:
-    try:
-        scenario_from_mapping(data)
-    except ScenarioError as error:
-        return [problem.message for problem in error.problems]
-    return []
-
-
-def on_slope(gap: float, **keys: object) -> dict[str, Any]:
-    """Place a brick on the slope y = x/2, its face `gap` m above it."""
-    height = 0.05 + gap
-    x, y = -height * math.sin(SLOPE), height * math.cos(SLOPE)
-    return {"x": 1 + x, "y": 0.5 + y, "angle": f"{SLOPE!r} rad", **keys}
-
-
-@pytest.mark.parametrize("fixed", [False, True])
-@pytest.mark.parametrize(
-    ("body", "tables"),
-    [
-        ({"x": 0, "y": 0.05}, {}),
-        ({"x": -0.1, "y": 0.05}, {"ground": {"profile": [[0, 0], [0, 1]]}}),  # beside a riser
-        ({"x": 0.1, "y": 1.05}, {"ground": {"profile": [[0, 0], [0, 1]]}}),  # on its upper level
-        ({"x": 0, "y": 1.05}, {"ground": {"profile": [[-1, 0], [0, 1], [1, 0]]}}),  # on a tip
-        (on_slope(0.0), {"ground": {"profile": [[0, 0], [2, 1]]}}),
-        ({"x": 0.1, "y": 0.05}, {"walls": [{"from": [0, 0], "to": [0, 1]}]}),
-        ({"x": 0, "y": 1.05}, {"walls": [{"from": [-1, 1], "to": [1, 1]}]}),  # on a shelf
-        ({"x": 0, "y": 1.05}, {"walls": [{"from": [0, 0], "to": [0, 1]}]}),  # on the tip of a wall
-        ({"x": 0, "y": 0.95}, {"walls": [{"from": [-1, 1], "to": [1, 1]}]}),  # below a shelf
-        ({"x": 0, "y": 0.05}, {"beside": [{"x": 0.2, "y": 0.05, "fixed": True}]}),
-    ],
-)
-def test_a_body_may_touch(body: dict[str, Any], tables: dict[str, Any], fixed: bool) -> None:
-    others = {key: table for key, table in tables.items() if key != "beside"}
-    assert mistakes(bricks_at([{**body, "fixed": fixed}, *tables.get("beside", [])], **others)) == []
-
-
-@pytest.mark.parametrize(("gap", "message"), [(-0.9e-9, []), (-1e-6, ["body 1 reaches 0.001 mm into"])])
-def test_a_nanometre_on_a_slope_is_forgiven(gap: float, message: list[str]) -> None:
-    data = bricks_at([on_slope(gap)], ground={"profile": [[0, 0], [2, 1]]})
-    assert [found[: len("body 1 reaches 0.001 mm into")] for found in mistakes(data)] == message
-
-
-def test_the_level_ground_beyond_the_ends_of_a_profile_counts() -> None:
-    profile = {"profile": [[0, 1], [1, 2]]}
-    assert mistakes(bricks_at([{"x": -5, "y": 1.05}, {"x": 50, "y": 2.05}], ground=profile)) == []
-
-
-def test_spacings_and_skins_count_for_the_blocks_in_use_and_the_models_that_use_them() -> None:
-    tiny = {"width": 0.01, "height": 0.001, "length": 0.01, "material": "oak"}
-    blocks = {"brick": OAK_BRICK, "tiny": tiny}
-    coarse = {"particle_spacing": 0.03, "smoothing_length": 0.049, "model": "kernel"}
-    wide = {"skin": 0.0011, "model": "particles", "particle_spacing": 5e-4}
-    for contact in (coarse, wide):
-        assert mistakes(bricks_at([{"x": 0, "y": 1}], blocks=blocks, contact=contact)) == []
-    used: list[dict[str, object]] = [{"x": 0, "y": 1}, {"x": 1, "y": 1, "block": "tiny"}]
-    assert mistakes(bricks_at(used, blocks=blocks, contact={**coarse, "model": "surface"})) == []
-
-
-def test_a_skin_may_be_as_small_and_as_large_as_its_limits_and_round_off_far_away_refuses_none() -> None:
-    for share in (1e-4, 1.0):
-        assert mistakes(bricks_at([{"x": 0, "y": 1}], contact={"skin": share * OAK_BRICK["height"]})) == []
-    assert mistakes(bricks_at([{"x": 0, "y": 1e13}])) == []
-
-
-def test_too_many_pieces_of_boundary() -> None:
+def test_too_many_pieces_of_boundary_and_probes_are_refused() -> None:
     points = [[float(i), 0.0] for i in range(1001)]
     walls = [{"from": [x, 9], "to": [x + 0.5, 9]} for x, _ in points]
-    pieces: dict[str, dict[str, Any]] = {"points": {"ground": {"profile": points}}, "walls": {"walls": walls}}
-    for name, tables in pieces.items():
-        told = f"1001 {name} are too many; at most 1000 are allowed"
-        assert mistakes(bricks_at([{"x": 0, "y": 1}], **tables)) == [told]
-
-
-STONE = {"depth": 0.1, "material": "oak"}
-BLOCKS = {
-    "wedge": {"outline": [[0, 0], [0.3, 0], [0, 0.3]], **STONE},
-    "hexagon": {"sides": 6, "radius": 0.1, **STONE},
-    "keystone": {"outline": [[-0.1, 0], [0.1, 0], [0.2, 0.2], [-0.2, 0.2]], **STONE},
-}
-HIGH = 0.1 * math.sqrt(3.0) / 2.0
-
-
-def outlined(bodies: list[dict[str, Any]], **tables: object) -> Scenario:
-    return Scenario.model_validate(freeze(data_of(blocks=BLOCKS, bodies=bodies, **tables)))
-
-
-def told(bodies: list[dict[str, Any]], **tables: object) -> list[tuple[object, str]]:
-    return [(finding.path, finding.message) for finding in impossible_starts(outlined(bodies, **tables))]
-
-
-def placed(block: str, x: float, y: float, angle: float = 0.0) -> PlacedBody:
-    degrees = f"{math.degrees(angle)!r} deg" if angle else 0
-    return place_bodies(outlined([{"block": block, "x": x, "y": y, "angle": degrees}]))[0]
-
-
-WEDGE = {"block": "wedge", "x": 0.1, "y": 0.1}
-TURNED = {"block": "wedge", "x": 0.2, "y": 0.2, "angle": "180 deg"}
-ALLOWED: dict[str, tuple[list[dict[str, Any]], dict[str, Any]]] = {
-    "a hexagon on its lowest side": ([{"block": "hexagon", "x": 0, "y": HIGH}], {}),
-    "wedges in the box of one another": ([WEDGE, TURNED], {}),
-    "a wedge on a slope of its own angle": ([TURNED], {"ground": {"profile": [[0, 0.3], [0.3, 0]]}}),
-    "a wall past the slanted side": ([WEDGE], {"walls": [{"from": [0.31, 0], "to": [0, 0.31]}]}),
-}
-
-
-@pytest.mark.parametrize(("bodies", "tables"), ALLOWED.values(), ids=ALLOWED)
-def test_outlines_may_touch(bodies: list[dict[str, Any]], tables: dict[str, Any]) -> None:
-    assert told(bodies, **tables) == []
-
-
-def test_loads_on_an_outline_are_accepted() -> None:
-    force = {"kind": "force", "body": "1", "magnitude": 1, "point": [0.05, 0.05]}
-    assert told([WEDGE], loads=[force, {"kind": "pressure", "body": "1", "magnitude": 1, "face": "left"}]) == []
+    probes = [{"kind": "energy", "name": f"e{number}"} for number in range(201)]
+    for name, tables, most in (
+        ("points", {"ground": {"profile": points}}, 1000),
+        ("walls", {"walls": walls}, 1000),
+        ("probes", {"probes": probes}, 200),
+    ):
+        with pytest.raises(ScenarioError, match=f"{most + 1} {name} are too many; at most {most} are allowed"):
+            scenario_from_mapping(data_of(bodies=[{"block": "brick", "x": 0, "y": 1}], **tables))
 
 
 @pytest.mark.parametrize(
@@ -240,7 +140,8 @@ def test_loads_on_an_outline_are_accepted() -> None:
 def test_the_face_of_an_outline_is_the_nearest_that_way_or_that_of_its_number(
     face: Face, ends: tuple[tuple[float, float], ...]
 ) -> None:
-    body = placed("wedge", 0.1, 0.1, math.radians(30))
+    wedge = [{"block": "wedge", "x": 0.1, "y": 0.1, "angle": "30 deg"}]
+    body = placed_outline([[0, 0], [0.3, 0], [0, 0.3]], bodies=wedge)
     found = face_of(body.corners, face)
     assert found is not None
     assert np.array(found[:2]) == pytest.approx(np.array(ends), abs=1e-15)

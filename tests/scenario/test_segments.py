@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.errors import ScenarioError
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments, scenario_from_mapping
 from blocksim.scenario.events import Joint, joint_between
 from blocksim.scenario.placement import surface_heights
@@ -153,10 +152,3 @@ def test_a_joint_of_a_drawing_may_have_the_rounding_of_its_corners(corner: float
     assert joint.normal == pytest.approx((0.0, 1.0))
     gaps = [upper.y + of_b[1] - lower.y - of_a[1] for of_a, of_b in zip(joint.ends_of_a, joint.ends_of_b, strict=True)]
     assert gaps == pytest.approx([0.0, corner - 0.1], abs=1e-12)
-
-
-def test_more_probes_than_a_run_can_write_at_its_end_are_refused() -> None:
-    probes = [{"kind": "energy", "name": f"e{number}"} for number in range(201)]
-    assert len(scenario_from_mapping(data_of(probes=probes[:200])).probes) == 200
-    with pytest.raises(ScenarioError, match="201 probes are too many; at most 200 are allowed"):
-        scenario_from_mapping(data_of(probes=probes))

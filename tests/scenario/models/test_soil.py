@@ -1,7 +1,6 @@
 """Tables of soils and materials that are soils; wrong ones are in broken/soils.txt."""
 
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 from blocksim.errors import ScenarioError
 from blocksim.scenario import (
     geometry,
-    load_scenario,
     place_bodies,
     placement,
     scenario_from_mapping,
@@ -19,10 +17,8 @@ from blocksim.scenario import (
     start,
 )
 from blocksim.scenario.models.soil import SoilTable
-from tests.soils import BLOCKS, MATERIALS, column, data_of, scene
+from tests.soils import MATERIALS, column, data_of, scene
 
-OUTLINE = {"name": "heap", "material": "rods", "spacing": 0.005}
-CORNERS = [[0.2, 0.0], [0.3, 0.0], [0.2, 0.05]]
 SLOPE = {**column(0.3, 0.1, 0.005), "kind": "slope", "angle": "45 deg"}
 
 
@@ -57,16 +53,6 @@ def test_the_hash_changes_with_what_and_where_a_soil_is() -> None:
     for place in ({"y": [0.0, 0.06]}, {"spacing": 0.0025}, {"start": "ramp"}, {"gradient": "raw"}):
         hashes.add(scenario_hash(scene({**table, **place})))
     assert len(hashes) == 1 + 3 + 4
-
-
-def test_a_scenario_with_soil_is_written_and_read_back(tmp_path: Path) -> None:
-    before = scene({**OUTLINE, "outline": CORNERS})
-    (tmp_path / "soil.toml").write_text(scenario_to_toml(before))
-    after = load_scenario(tmp_path / "soil.toml")
-    (table,) = after.systems["soils"]
-    assert isinstance(table, SoilTable)
-    assert after == before
-    assert BLOCKS["far"]["width"] == after.blocks["far"].width
 
 
 def arch_under(level: float) -> dict[str, Any]:
