@@ -1,7 +1,6 @@
 """Measured tables and tables of properties: the numbers that the paper prints, and what is said of broken ones."""
 
 from decimal import ROUND_HALF_UP, Decimal
-from math import radians
 from pathlib import Path
 
 import numpy as np
@@ -85,22 +84,9 @@ def test_tables_are_understood_as_they_were_read(golden: Golden, tmp_path: Path)
     golden("\n\n".join(texts), rules=["digits"])
 
 
-def test_table_1_and_the_sizes_arrive_in_si() -> None:
-    assert dict(load_properties(EXPERIMENTS / "three_blocks_properties.csv").values) == pytest.approx(
-        {
-            "width": 0.032,
-            "height": 0.025,
-            "length": 0.050,
-            "overlap": 0.010,
-            "unit_weight": 26.7e3,
-            "young_modulus": 69e9,
-            "poisson_ratio": 0.3,
-            "friction_block_block": 0.31,
-            "friction_block_ground": 0.38,
-            "ground_friction_angle": radians(21),
-        },
-        rel=1e-14,
-    )
+def test_table_1_and_the_sizes_arrive_in_si(golden: Golden) -> None:
+    values = load_properties(EXPERIMENTS / "three_blocks_properties.csv").values
+    golden("\n".join(f"{name}: {value}" for name, value in values.items()), rules=["digits"])
 
 
 SPOILT = {

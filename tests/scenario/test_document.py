@@ -1,4 +1,4 @@
-"""Loading: from files and from Python, with values set from outside, and the files that a scenario names."""
+"""Loading: from files and from Python, forms of values and settings, and the files that a scenario names."""
 
 import os
 from collections.abc import Callable

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from blocksim.scenario.document import Span, locate
 from blocksim.scenario.models.contact import PairFriction
 from blocksim.scenario.models.motion import FromTable
-from blocksim.scenario.overrides import MISSING, KeyPath, field_at, follow, format_key, is_known, parse_key, table_at
+from blocksim.scenario.overrides import KeyPath, field_at, format_key, is_known, parse_key, table_at
 from blocksim.scenario.spelling import USUAL, meant_word, nearest
 from blocksim.scenario.structures.masonry import Stack
 from tests.golden import Golden
@@ -48,14 +48,6 @@ def test_what_is_no_key(text: str) -> None:
 @given(st.lists(st.text(st.characters(max_codepoint=0xFFFF, exclude_categories=["Cs"])), min_size=1, max_size=4))
 def test_a_key_that_was_written_is_read_again(parts: list[str]) -> None:
     assert parse_key(format_key(parts)) == tuple(parts)
-
-
-def test_follow() -> None:
-    assert follow(DATA, ("structures", 0, "kind")) == "stack"
-    assert follow(DATA, ()) is DATA
-    structures: list[tuple[str | int, ...]] = [("structures", place) for place in (3, -1, "0")]
-    for path in (*structures, ("nothing",), ("friction", "block_block", 0)):
-        assert follow(DATA, path) is MISSING
 
 
 def test_the_model_of_a_table_depends_on_its_kind_and_a_field_is_found_by_its_name_in_the_file() -> None:

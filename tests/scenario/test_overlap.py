@@ -49,22 +49,6 @@ def segment(x0: float, y0: float, x1: float, y1: float) -> PlacedSegment:
     return PlacedSegment(x0, y0, x1, y1, material=None, **flags)
 
 
-def length_inside(piece: PlacedSegment, b: PlacedBody) -> float:
-    """Length of a piece inside a rectangle, by cutting it with every side of the rectangle."""
-    low, high = 0.0, 1.0
-    outline = corners(b)
-    for (ax, ay), (bx, by) in zip(outline, outline[1:] + outline[:1], strict=True):
-        start = (bx - ax) * (piece.y0 - ay) - (by - ay) * (piece.x0 - ax)
-        end = (bx - ax) * (piece.y1 - ay) - (by - ay) * (piece.x1 - ax)
-        if start < 0 and end < 0:
-            return 0.0
-        if start < 0:
-            low = max(low, start / (start - end))
-        elif end < 0:
-            high = min(high, start / (start - end))
-    return max(0.0, high - low) * piece.length
-
-
 def depth_of(one: PlacedBody, other: PlacedBody) -> float:
     (depth,) = penetration(Outlines.of([one]), Outlines.of([other]))
     return float(depth)
@@ -169,11 +153,3 @@ def test_polygons_penetrate_where_they_have_an_area_in_common(one: PlacedBody, o
     assert depth == pytest.approx(depth_of(other, one), abs=1e-15)
     lowest = min(y for _, y in corners(one))
     assert Outlines.of([other, one]).bottom[1] == pytest.approx(lowest, abs=1e-15)
-
-
-@given(polygons(), st.tuples(place, place, place, place).filter(lambda p: math.dist(p[:2], p[2:]) > 1e-4))
-def test_a_piece_crosses_a_polygon_where_a_part_of_it_is_inside(
-    block: PlacedBody, ends: tuple[float, float, float, float]
-) -> None:
-    found = list(overlapping_pairs([block], [segment(*ends)]))
-    assert bool(found) == (length_inside(segment(*ends), block) > 0) or all(depth < 1e-6 for *_, depth in found)

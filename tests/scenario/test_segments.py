@@ -1,8 +1,11 @@
 """The pieces of profiles and walls, how they join, and joints between bodies as they are placed."""
 
 import math
+import tomllib
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,37 +63,7 @@ def test_the_height_of_the_surface_is_zero_on_flat_ground_which_is_no_segment() 
     assert surface_heights(scenario(), np.array([3.0]))[0] == 0.0
 
 
-Scene = tuple[list[Point] | None, list[Mapping[str, object]]]
-
-
-def wall(*points: Point, **keys: str) -> list[Mapping[str, object]]:
-    """Return walls from point to point."""
-    return [{"from": start, "to": end, **keys} for start, end in pairwise(points)]
-
-
-TENT: list[Point] = [(0, 0), (3, 1), (6, 0)]
-RISER: list[Point] = [(0, 0), (3, 0), (3, 2)]
-SCENES: dict[str, Scene] = {
-    "a level profile": ([(0, 0.5), (1, 0.5), (7, 0.5)], []),
-    "a slope of many points": ([(0.1 * i, 0.03 * i) for i in range(8)], []),
-    "a free wall has two edges": (None, wall((1, 2), (3, 2), material="oak")),
-    "a wall up from the ground": (None, wall((3, 0), (4, 5))),
-    "a wall down to the ground": (None, wall((4, 5), (3, 0))),
-    "a wall from below the ground": (None, wall((3, -0.5), (4, 5))),
-    "a wall from less than a nanometre above the ground": (None, wall((3, 0.9e-9), (4, 5))),
-    "a wall from more than a nanometre above the ground": (None, wall((3, 1.1e-9), (3, 5))),
-    "a wall up from the tip of a profile": (TENT, wall((3, 1), (4, 5))),
-    "a wall down to the tip of a profile": (TENT, wall((4, 5), (3, 1))),
-    "a wall up from a riser": (RISER, wall((3, 1), (4, 5))),
-    "a wall down to a riser": (RISER, wall((4, 5), (3, 1))),
-    "a post on a shelf": (None, wall((0, 2), (4, 2)) + wall((3, 2), (3, 4))),
-    "walls that follow each other join as a profile does": (None, wall((0, 2), (1, 1), (2, 1), (2, 0.5))),
-    "two faces of one sheet have each edge once": (None, wall((0, 1), (0, 2), (0, 1))),
-    "segments of the profile come before walls": (
-        [(0, 0), (1, 1)],
-        wall((5, 5), (6, 6), material="oak") + wall((7, 7), (8, 8)),
-    ),
-}
+SCENES: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("segments.toml").read_text())
 
 
 def told(piece: PlacedSegment) -> str:
@@ -102,7 +75,7 @@ def told(piece: PlacedSegment) -> str:
 
 def test_pieces_join_where_they_meet(golden: Golden) -> None:
     """Points within a straight line are left out; a wall continues where ground or another wall covers its end."""
-    pieces = {name: place_segments(scenario(profile, walls)) for name, (profile, walls) in SCENES.items()}
+    pieces = {name: place_segments(scenario(**tables)) for name, tables in SCENES.items()}
     golden("\n".join("\n  ".join([name, *map(told, found)]) for name, found in pieces.items()))
 
 

@@ -136,17 +136,6 @@ def test_miss_is_zero_at_the_limit_and_grows_steadily_outwards() -> None:
     assert min(miss_of([math.nextafter(at, to)], narrow) for at, to in ((71.69, 0.0), (78.53, 100.0))) > 0.0
 
 
-def test_guidance_tells_ensembles_without_a_hit_apart_and_never_outweighs_a_probability() -> None:
-    kinds = [member(12.0), member(13.99), member(14.01), member(1e6), FAILED]
-    scores = [score_of(chosen, RANGES) for chosen in itertools.combinations_with_replacement(kinds, 3)]
-    for one, other in itertools.permutations(scores, 2):
-        if one.inside > other.inside:
-            assert one.value > other.value
-    near, far = (score_of([member(x), member(x + 1.0)], RANGES) for x in (15.0, 25.0))
-    assert near.share_inside == far.share_inside == 0.0
-    assert near.value > far.value
-
-
 def test_failed_members_count_as_outside_and_each_quantity_is_reported_by_itself() -> None:
     score = score_of([member(12.0), FAILED, member(math.nan)], RANGES)
     assert (score.members, score.inside, score.failed) == (3, 1, 2)
@@ -173,17 +162,6 @@ def hill(values: Values) -> Score:
 def made(journal: Path, trials: int, seed: int = 3, evaluate: Callable[[Values], Score] = hill) -> list[Trial]:
     with open_journal(journal, PLAN) as study:
         return list(search(PRIORS, evaluate, study, trials=trials, seed=seed))
-
-
-def test_finds_a_small_region_and_never_leaves_the_priors(tmp_path: Path) -> None:
-    trials = made(tmp_path / "journal", 60)
-    assert [trial.number for trial in trials] == list(range(1, 61))
-    assert max(trial.score.share_inside for trial in trials) == 1.0
-    for trial in trials:
-        for prior in PRIORS:
-            assert prior.low <= prior.number(trial.values[prior.key]) <= prior.high
-    early, late = (sum(trial.score.inside for trial in some) for some in (trials[:20], trials[-20:]))
-    assert late > 3 * early  # it learns
 
 
 @pytest.mark.parametrize("killed_after", [0, FIRST, FIRST + 6])

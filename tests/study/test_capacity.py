@@ -5,7 +5,6 @@ from typing import Any
 import pytest
 
 import blocksim
-from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.study.capacity import bound_of
 
@@ -88,21 +87,3 @@ def test_a_curve_that_still_rises_at_its_end_is_warned_of() -> None:
     )
     assert any("still rises" in text for text in answer.warnings)
     assert answer.all[0].stiffness > 0.0
-
-
-@pytest.mark.parametrize("slow", ["0.05 mm/s", pytest.param("0.005 mm/s", marks=pytest.mark.long)])
-def test_what_an_actuator_at_a_tenth_or_hundredth_of_the_speed_finds_is_the_same(slow: str) -> None:
-    one, other = (
-        blocksim.capacity(blocksim.run(rocked({"kind": "ramp", "to": "0.5 mm", "rate": rate}))).all[0]
-        for rate in ("0.5 mm/s", slow)
-    )
-    assert other.peak == pytest.approx(one.peak, rel=2e-3)
-    assert other.work == pytest.approx(one.work, rel=2e-3)
-
-
-def test_runs_without_actuators_are_refused() -> None:
-    result = blocksim.run(rocked(CYCLES, actuators=[], time={"scheme": "nonsmooth", "end": 0.01}))
-    with pytest.raises(InvalidInputError, match=r"no \[\[actuators\]\]"):
-        blocksim.capacity(result)
-    with pytest.raises(InvalidInputError, match=r"no \[\[actuators\]\]"):
-        result.plot("capacity")

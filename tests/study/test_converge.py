@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from contextlib import nullcontext
 from math import radians
 from pathlib import Path
@@ -29,7 +30,6 @@ from tests.study.conftest import SCENARIOS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
     from blocksim.study.rows import Row
     from tests.golden import Golden
@@ -54,23 +54,7 @@ def finished(x_mm: float, rotation_deg: float = 0.0, seconds: float = 1.0, y_mm:
     return {"status": "finished", "reason": "at rest", "seconds": seconds, **ends}
 
 
-PLACES = {  # mm: final places from the next coarser level on; the second one is the scenario's own
-    "half an order": [70.0 + 3.0 * 0.5 ** (0.5 * level) for level in range(5)],
-    "second order": [70.0 + 3.0 * 0.25**level for level in range(5)],
-    "turns back": [70.0, 70.2, 70.1],
-    "grows": [70.0, 70.1, 70.3],
-    "stays": [70.0, 70.0, 70.0],
-    "round-off": [70.0, 70.0 + 3e-7, 70.0 + 4e-7],
-    "small changes": [70.0, 70.05, 70.06, 70.09],
-    "two small changes after a large one": [70.0, 75.0, 75.05, 75.0],
-    "shrinking changes": [70.0, 74.0, 76.0, 77.0],
-    "to and fro": [70.0, 74.0, 71.0, 73.9],
-    "large change at last": [70.0, 70.01, 70.03, 70.2],
-    "from outcome to outcome": [70.0, 9000.0, 4900.0, 2800.0],
-    "another outcome at first": [9000.0, 70.0, 70.05, 70.02],
-    "near by luck": [70.0, 70.5, 70.03, 70.0, 70.0],
-    "own level is enough": [70.2, 70.05, 70.02, 70.0],
-}
+PLACES: dict[str, list[float]] = tomllib.loads(Path(__file__).with_name("converge.toml").read_text())
 
 
 def told(study: RefinementStudy) -> str:

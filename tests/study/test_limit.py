@@ -68,15 +68,6 @@ def test_processes_are_started_once_and_not_for_every_round(tmp_path: Path, monk
     assert not active_children()
 
 
-def test_the_folder_holds_the_answer_for_programs_and_the_scenario(slid: LimitAnswer) -> None:
-    data = json.loads((slid.folder / "limit.json").read_text())
-    assert (data["key"], data["unit"], data["runs"]) == (TILT, "deg", len(slid.rows) + 2)
-    assert data["changes"][0]["above"]["outcome"] == "slid"
-    assert data["environment"]["blocksim"]
-    assert (slid.folder / "limit.csv").read_text().startswith("value [deg],verdict,outcome,")
-    assert Document.read(slid.folder / "limit.toml").build().name == "slope"
-
-
 def test_a_limit_is_drawn_as_its_mechanism_beside_the_last_that_stands(
     slid: LimitAnswer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,22 +1,18 @@
 """Limits of the literature, in both schemes: Goodman & Bray's slope, and diamonds of half-overlapped rows."""
 
-import math
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from blocksim.scenario import Document, load_scenario
+from blocksim.scenario import Document
 from blocksim.study.limit import STIFFNESS, limit
 from blocksim.study.limit_plan import with_scheme
 from blocksim.study.run import run
 from tests.study.conftest import SCENARIOS
-from tests.study.plans import block_on_a_slope
 
 SCHEMES = ("nonsmooth", "explicit")
 SLOPE, WALL = SCENARIOS / "toppling_slope.toml", SCENARIOS / "tilting_wall.toml"
 FRICTION = "friction.block_block"
-WIDTH, HEIGHT = 0.2, 0.1  # m
 GRAVITY = 9.81
 
 
@@ -89,49 +85,3 @@ def test_a_pulse_overturns_a_block_on_soft_springs_from_the_published_amplitude_
     (answer,), given = found.changes, found.brackets[0].given  # what does not fall rocks on at the end
     assert given.low > 0.745 * GRAVITY
     assert 0.99 * 0.7362 * GRAVITY < answer.low < 0.7362 * GRAVITY < answer.high < 1.01 * 0.7362 * GRAVITY
-
-
-def rows_of(*counts: int, scheme: str) -> dict[str, Any]:
-    """Return rows of so many blocks from below, each centred: half overlapped where they differ by one."""
-    step = 2e-4 if scheme == "nonsmooth" else "auto"  # with 1 ms, what contacts give way grows to a fall
-    places = [(i - 0.5 * (count - 1), row + 0.5) for row, count in enumerate(counts) for i in range(count)]
-    return block_on_a_slope((WIDTH, HEIGHT), scheme=scheme, end=0.4, step=step) | {
-        "bodies": [{"block": "b", "x": WIDTH * x, "y": HEIGHT * y} for x, y in places],
-        "friction": {"block_block": 0.0, "block_ground": 0.0},
-        "contact": {"restitution": 0.0} | ({"stiffness_scale": 0.1} if scheme == "explicit" else {}),
-        "output": {"every": 0.05},
-    }
-
-
-@pytest.mark.long
-def test_the_limits_of_a_dry_wall_on_springs_agree_between_stiffnesses(tmp_path: Path) -> None:
-    """Ferris & Tin-Loi: at the stiffness scale 0.001 the wall itself falls 5.7 % too early, at 0.01 0.6 %."""
-    wall = with_scheme(Document.read(WALL), "explicit").with_values({"start.settle": True})
-    span = {"ground.tilt": {"from": "29 deg", "to": "33.5 deg", "count": 4}}
-    for scale, off in ((0.001, 0.057), (0.01, 0.006)):
-        soft = wall.with_values({STIFFNESS: scale})
-        found = limit(soft, span, out=tmp_path / f"{scale}", tolerance=2e-3, keep_runs=False)
-        (answer,), (bracket,) = found.limits, found.brackets
-        given, give = bracket.given, bracket.give
-        assert give is not None
-        assert give.share == pytest.approx(off, rel=0.2)
-        assert 1.0 - given.low / answer.low == pytest.approx(off, rel=0.1, abs=2e-3)
-        # associated flow is a rigorous bound, with friction as it is the limit is near 0.6398
-        assert math.degrees(math.atan(0.6398)) * 0.997 < answer.low < math.degrees(math.atan(0.64286))
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize(
-    ("counts", "outcome"),
-    [
-        ((1, 2, 3, 4, 3, 2, 1), "stands"),
-        ((1, 2, 3, 4, 5, 4, 3, 2, 1), "fell"),
-        ((1, 2, 3), "fell"),
-    ],
-)
-def test_of_frictionless_diamonds_the_one_with_four_blocks_across_is_the_largest_that_stands(
-    counts: tuple[int, ...], outcome: str, scheme: str
-) -> None:
-    found = run(load_scenario(rows_of(*counts, scheme=scheme)))
-    assert found.summary.movement is not None
-    assert found.summary.movement.outcome == outcome

@@ -17,7 +17,6 @@ from blocksim.study.plan import Design, Values, design_of, draw_values, open_int
 from tests.study.plans import KINETIC, OVERLAP, RATIO, SCALE, TILT, cases, plan_of, sweep_of
 
 COUNT = "structures.0.count"
-SHAKEN = Path(__file__).parents[2] / "scenarios" / "shaking_table.toml"
 
 
 @pytest.mark.parametrize(
@@ -63,16 +62,6 @@ def test_impossible_combination_is_kept_with_its_reason_beside_the_scenario_that
     assert "kinetic friction 0.9 is above static friction 0.31" in bad.problem
 
 
-def test_sweep_without_a_possible_case_and_one_of_too_many_are_refused(
-    nominal: Document, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with pytest.raises(InvalidInputError, match=r"none of the 2 cases can be simulated; the first: .*0\.8"):
-        cases(nominal, {KINETIC: [0.8, 0.9]})
-    monkeypatch.setattr(plan, "MOST_CASES", 5)
-    with pytest.raises(InvalidInputError, match="6 cases are too many"):
-        cases(nominal, {KINETIC: [0.1, 0.2], SCALE: [1.0, 2.0, 3.0]})
-
-
 def test_cases_are_made_when_they_are_asked_for(nominal: Document) -> None:
     friction, ends = ({"from": low, "to": high, "count": 1000} for low, high in ((0.1, 0.3), (1.0, 2.0)))
     many = cases(nominal, {KINETIC: friction, "time.end": ends})
@@ -81,17 +70,6 @@ def test_cases_are_made_when_they_are_asked_for(nominal: Document) -> None:
     assert last is not None
     assert (last.friction.block_block.kinetic, last.time.end, last.sweep) == (0.3, 2.0, None)
     assert [case.settings["time.end"] for case in (many[0], many[1])] == [1.0, 1.001001001001001]
-
-
-def test_tables_of_motion_are_read_once_for_all_cases(tmp_path: Path) -> None:
-    (tmp_path / "shake.csv").write_text("time_s,displacement_mm\n0,0\n1,2\n")
-    text = SHAKEN.read_text() + '\n[sweep]\n"motion.scale" = [1.0, 2.0]\n'
-    motion = text[text.index("[motion]") : text.index("\n[", text.index("[motion]") + 1)]
-    document = Document.parse(text.replace(motion, '[motion]\nkind = "table"\ntable = "shake.csv"\n'), folder=tmp_path)
-    made = cases(document)
-    (tmp_path / "shake.csv").unlink()
-    motions = [case.scenario.motion for case in made if case.scenario is not None]
-    assert [(one.kind, getattr(one, "scale", None)) for one in motions if one] == [("table", 1.0), ("table", 2.0)]
 
 
 @pytest.mark.parametrize("friction", [0.31, {"static": 0.31, "kinetic_ratio": 0.5}, None])
@@ -242,15 +220,6 @@ def test_sobol_points_beyond_one_chunk_continue_the_sequence_and_unbalanced_numb
         sweep_of(nominal, mode, {SCALE: UNIT}, samples=n) for mode, n in (("sobol", 100), ("sobol", 64), ("lhs", 100))
     ]
     assert [remarks(one) for one in drawn] == [["100 Sobol points are not balanced; 64 or 128 are"], [], []]
-
-
-def test_independent_draws_are_uniform_and_uncorrelated(nominal: Document) -> None:
-    n = 20_000
-    points = places(nominal, "normal", n)
-    assert np.abs(points.mean(axis=0) - 0.5).max() < 4 * math.sqrt(1 / 12 / n)
-    assert abs(correlation(points)) < 4 / math.sqrt(n)
-    ranks = np.sort(points[:, 0])
-    assert np.abs(ranks - (np.arange(n) + 0.5) / n).max() < 1.95 / math.sqrt(n)  # Kolmogorov-Smirnov, 0.1 %
 
 
 @pytest.mark.parametrize("mode", SAMPLED)

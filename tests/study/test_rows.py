@@ -10,7 +10,6 @@ import pytest
 
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import load_table
-from blocksim.errors import OutputExistsError
 from blocksim.scenario import Document
 from blocksim.study.manifest import CaseIndex, Entry, Manifest, read_entries, short_hash
 from blocksim.study.plan import Values, with_sweep
@@ -134,15 +133,6 @@ def test_torn_at_any_byte_it_loses_the_last_line_only(tmp_path: Path) -> None:
         assert [entry for _, entry in read_entries(path)] == ENTRIES[:2]
         (start,) = written(path, ENTRIES[3:])
         assert list(read_entries(path))[2:] == [(start, ENTRIES[3])]
-
-
-def test_second_writer_is_refused_until_the_first_has_gone(tmp_path: Path) -> None:
-    path = tmp_path / "manifest.jsonl"
-    first = Manifest(path)
-    with pytest.raises(OutputExistsError, match="already running"):
-        Manifest(path)
-    first.close()
-    Manifest(path).close()
 
 
 def test_line_with_a_right_sum_that_no_sweep_has_written_is_passed_over() -> None:

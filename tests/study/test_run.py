@@ -1,7 +1,6 @@
 """One run, from Python and as it lies on the disk; compared with an experiment, as sweeps are."""
 
 import json
-import os
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +15,6 @@ from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document, Scenario, load_scenario
 from blocksim.simulation import Result, simulate_into
 from blocksim.simulation.instruments import bytes_of_series
-from blocksim.study import run as single
 from blocksim.study.compare import compare, compare_run, compare_sweep
 from blocksim.study.manifest import SweepResult
 from blocksim.study.run import run
@@ -56,26 +54,6 @@ def test_python_users_need_four_names_and_a_run_without_a_folder_writes_nothing(
     assert list(tmp_path.iterdir()) == []
     vary = {"contact.stiffness_scale": [0.001], "time.end": [0.01]}
     assert blocksim.sweep(SCENARIOS / "tower.toml", vary, out=tmp_path, jobs=1).failed == 0
-
-
-def test_finished_run_is_not_run_again_unless_it_is_to_be_overwritten(
-    copy: Path, kept: Result, scenario: Scenario, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    os.utime(copy / "run.json", (0.0, 0.0))
-    run(scenario, out=copy, overwrite=True)
-    assert (copy / "run.json").stat().st_mtime_ns > 0
-    monkeypatch.setattr(single, "simulate_into", None)
-    assert run(scenario, out=kept.folder).summary == kept.summary
-
-
-def test_table_that_does_not_fit_the_blocks_is_reported_before_the_run(scenario: Scenario, tmp_path: Path) -> None:
-    table = tmp_path / "table.csv"
-    table.write_text("block,quantity,unit,replicate,value\n4,x,mm,1,5.0\n")
-    assert scenario.experiment is not None
-    other = scenario.model_copy(update={"experiment": scenario.experiment.model_copy(update={"table": table})})
-    with pytest.raises(InvalidInputError, match="measures block '4'"):
-        run(other, out=tmp_path / "run")
-    assert not (tmp_path / "run").exists()
 
 
 def test_result_table_and_folder_compare_alike_and_a_table_alone_needs_an_experiment(kept: Result) -> None:
@@ -192,15 +170,6 @@ def folder(tmp_path: Path) -> Path:
     """Give the folder of a short finished run."""
     simulate_into(load_scenario(SCENARIOS / "bounce.toml", BRIEF), tmp_path / "run")
     return tmp_path / "run"
-
-
-def test_newest_of_several_finished_runs_is_named_and_one_needs_no_remark(folder: Path) -> None:
-    stored = read_run(folder.parent)
-    assert (stored.remark, stored.scenario.name, len(stored.frames)) == ("", "bounce", 5)
-    shutil.copytree(folder, folder.parent / "older")
-    os.utime(folder.parent / "older" / "done.json", (0.0, 0.0))
-    assert read_run(folder.parent).remark == f"{folder.parent}: the newest of 2 runs is taken: {folder}"
-    assert read_run(folder).remark == ""
 
 
 def test_what_did_not_finish_and_missing_and_damaged_frames_are_reported(folder: Path, golden: Golden) -> None:

@@ -85,27 +85,6 @@ def test_the_synthetic_record_is_what_its_script_makes() -> None:
     np.testing.assert_allclose(found.values, STANDARD_GRAVITY * script["record"](), rtol=0, atol=1e-7)
 
 
-def test_dominoes_fall_one_after_the_other_at_a_constant_speed() -> None:
-    result = run_shipped("dominoes")
-    assert result.reason == "at rest"
-    assert (result.final["rotation_deg"] < -60.0).all()
-    frames = result.frames
-    starts = np.array([frames.time[np.argmax(turned < -0.02)] for turned in frames.rotation.T])
-    assert (np.diff(starts) > 0.0).all()
-    for first, last in ((10, 17), (17, 23)):
-        assert (last - first) * 0.023 / (starts[last] - starts[first]) == pytest.approx(0.86, abs=0.03)
-
-
-def test_pushed_wall_leans_more_the_higher_a_course_is() -> None:
-    """The first moments; a whole run takes longer than a test may."""
-    result = run_shipped("wall", **{END: 0.05})
-    moved = result.frames.x[-1] - result.frames.x[0]
-    left = moved.reshape(25, 40)[:, :20].mean(axis=1)  # the other end breaks off
-    assert (np.diff(left) > 0.0).all()
-    assert abs(left[0]) < 1e-4
-    assert 0.02 < left[-1] < 0.05  # 1 m/s, less friction
-
-
 def test_drums_begin_to_rock_at_the_foot_as_one_block_and_the_upper_eight_fall_at_half_of_gravity() -> None:
     """Half the width of the foot over the height of the centre: h/3 (w0 + 2 w1)/(w0 + w1)."""
     height = 10.33 / 3.0 * (1.63 + 2.0 * 1.31) / (1.63 + 1.31)
@@ -118,13 +97,6 @@ def test_drums_begin_to_rock_at_the_foot_as_one_block_and_the_upper_eight_fall_a
         assert (least < 26) == opens  # two contacts for each drum
     final = run_shipped("drum_column").final
     assert (final["rotation_deg"].abs() > 60.0).tolist() == [False] * 5 + [True] * 8
-
-
-def test_slope_of_cells_begins_to_slide_below_the_friction_that_holds_it() -> None:
-    for angle, low, high in (("15 deg", 20.0, np.inf), ("20 deg", 0.0, 5.0)):
-        movement = run_shipped("voronoi_slope", **{BLOCKS: angle, END: 0.4}).summary.movement
-        assert movement is not None
-        assert low <= movement.largest_displacement_mm < high
 
 
 @pytest.mark.long

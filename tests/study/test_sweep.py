@@ -1,8 +1,6 @@
 """A sweep keeps one row per case, repeats nothing, and continues where a case fails."""
 
 import json
-import os
-import signal
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
@@ -15,11 +13,10 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
+from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, load_scenario
 from blocksim.simulation.files import is_resolved
 from blocksim.simulation.observables import table_columns
-from blocksim.study.executors.ensemble import run_case
 from blocksim.study.fragility import fragility, read_fragility
 from blocksim.study.limit import limit, limit_curve
 from blocksim.study.manifest import Entry, Manifest, Shard, read_sweep
@@ -59,17 +56,6 @@ def test_row_is_what_a_single_run_gives(nominal: Document, tmp_path: Path) -> No
     assert movement is not None
     assert (row["outcome"], row["first_mover"]) == (movement.outcome, movement.first_mover) == ("fell", "3")
     assert row["first_moved_s"] == movement.first_moved_s
-
-
-def test_rows_distinguish_what_rocked_back_from_what_stands(tmp_path: Path) -> None:
-    spins = {"bodies.0.spin": [0.0, 6.0]}
-    table = sweep(ROCKING, spins, out=tmp_path / "sweep", jobs=1).table
-    assert table["outcome"].tolist() == ["stands", "rocked back"]  # both end where they began
-    assert table["first_mover"].isna().tolist() == [True, False]
-    assert table["first_mover"][1] == "1"
-    assert table["first_moved_s"][1] == pytest.approx(0.01, abs=1e-5)  # the first frame
-    kept = run_case(Document.from_mapping(ROCKING).with_values({"bodies.0.spin": 6.0}).build(), tmp_path / "case")
-    assert [kept[name] for name in table_columns()] == [table[name][1] for name in table_columns()]
 
 
 def test_folder_holds_plan_table_and_manifest_and_the_plan_repeats_the_sweep(
@@ -317,25 +303,6 @@ def test_who_begins_a_sweep_waits_while_another_one_makes_room_for_it(
         may_go_on.set()
         for one in waiting:
             one.result(timeout=10.0)
-
-
-def test_ctrl_c_keeps_the_rows_so_far_and_the_next_call_does_the_rest(quick: Document, tmp_path: Path) -> None:
-    vary = {KINETIC: [0.1 + 0.001 * k for k in range(120)]}
-    whole = sweep(quick, vary, out=tmp_path / "whole")
-
-    def press_ctrl_c(done: int, *_: object) -> None:
-        if done == 2:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    with pytest.raises(StoppedEarlyError, match="of 120 cases done; rerun the command to finish"):
-        sweep(quick, vary, jobs=1, out=tmp_path / "cut", on_row=press_ctrl_c)
-    some = len(read_sweep(tmp_path / "cut").table)
-    assert 2 <= some < 120
-    told: list[int] = []
-    sweep(quick, vary, out=tmp_path / "cut", on_row=lambda done, *_: told.append(done))
-    assert told == list(range(some + 1, 121))
-    assert (tmp_path / "cut" / "sweep.csv").read_bytes() == (tmp_path / "whole" / "sweep.csv").read_bytes()
-    assert len(whole.table) == 120
 
 
 def test_share_inside_counts_failed_cases_as_outside_and_needs_an_experiment(tmp_path: Path) -> None:
