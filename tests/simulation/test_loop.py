@@ -30,7 +30,6 @@ from blocksim.simulation.schemes import (
     BODIES_A_THREAD,
     SCHEMES,
     Team,
-    build,
     build_scene,
     measure_row,
     team_for,
@@ -39,21 +38,13 @@ from blocksim.simulation.schemes import (
 from blocksim.simulation.schemes.explicit import SURFACE_OF_OUTLINES
 from blocksim.simulation.schemes.nonsmooth import IN_ROUNDS, OF_OUTLINES
 from blocksim.world import build as world_build
-from blocksim.world.build import InitialScene, arrays_of, build_world
+from blocksim.world.build import arrays_of, build_world
 from tests.simulation.sliding import sliding
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from tests.simulation.conftest import Shipped
-
-
-def steps_of(recorder: Recorder, last: int) -> list[int]:
-    done, found = 0, [0]
-    while done < last:
-        done = recorder.next_step(done)
-        found.append(done)
-    return found
 
 
 @pytest.mark.parametrize(
@@ -66,14 +57,12 @@ def steps_of(recorder: Recorder, last: int) -> list[int]:
 )
 def test_frames_fall_on_the_nearest_steps(every: float, step: float, expected: list[int]) -> None:
     recorder = Recorder([], every, step)
-    assert steps_of(recorder, 12) == expected
+    found = [0]
+    while found[-1] < 12:
+        found.append(recorder.next_step(found[-1]))
+    assert found == expected
     recorder.steps = [0, 5, 10]
     assert [recorder.count_until(step) for step in (0, 4, 5, 9, 10)] == [1, 1, 2, 2, 3]
-
-
-def test_frames_do_not_drift_over_a_long_run() -> None:
-    steps = steps_of(Recorder([], 1e-3, 2.984e-7), 7_000_000)
-    assert all(abs(step * 2.984e-7 - k * 1e-3) < 2.984e-7 for k, step in enumerate(steps))
 
 
 @pytest.mark.parametrize(("end", "step", "last"), [(1.0, 0.25, 4), (1.0, 0.3, 3), (1e-9, 1.0, 1)])
@@ -95,7 +84,7 @@ def test_rare_output_does_not_make_the_loop_deaf(soft: Shipped, wanted: int) -> 
     assert all(np.diff([0, *seen, recorder.next_step(0)]) > 0)
 
 
-@pytest.mark.parametrize("seconds_a_step", [1e-7, 1e-4, 0.5])
+@pytest.mark.parametrize("seconds_a_step", [1e-7, 0.5])
 def test_calls_come_to_last_as_long_as_wanted(seconds_a_step: float) -> None:
     steps = 25_000
     for _ in range(20):
@@ -114,66 +103,34 @@ def test_every_entry_is_in_the_residual(name: str) -> None:
     assert (some.residual, some.relative_residual) == (-3.0, 1.5)
 
 
-@pytest.mark.parametrize("bodies", [1, 3, 50, 10_000])
+@pytest.mark.parametrize("bodies", [3, 10_000])
 def test_looks_are_rarer_where_steps_are_cheap_whenever_a_run_was_interrupted(bodies: int) -> None:
     looks = [0]
     while looks[-1] < 10 * BODY_STEPS:
         looks.append(next_energy_check(looks[-1], bodies))
         assert next_energy_check(looks[-1] - 1, bodies) == looks[-1]
-    assert looks[1] == FIRST_CHECK
     assert BODY_STEPS // bodies <= looks[-1] - looks[-2] <= max(FIRST_CHECK, 4 * BODY_STEPS // bodies)
-
-
-def test_loss_of_energy_fails_a_run(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("blocksim.simulation.balance.RESIDUAL_LIMIT", 1e-30)
-    ended = simulate(soft(time__end=0.25))
-    assert (ended.status, ended.summary.exit_code) == ("failed", 76)
-    assert "the fastest is block " in ended.reason
 
 
 def test_where_a_run_fails_depends_on_nothing_that_watches_it(soft: Shipped, tmp_path: Path) -> None:
     wild: dict[str, Any] = {"time__force_step": True, "time__step": 6e-4, "contact__max_overlap": 1.0}
     wild["time__end"] = 20.0
-    often = CheckpointPolicy(checkpoint_steps=13)
+    often = CheckpointPolicy(checkpoint_steps=1)
     one = simulate(soft(**wild))
     other = simulate_into(soft(**wild, output__every=0.0137), tmp_path / "run", precautions=often)
-    assert (one.summary.exit_code, one.summary.steps) == (76, FIRST_CHECK)
+    assert (one.status, one.summary.exit_code, one.summary.steps) == ("failed", 76, FIRST_CHECK)
     assert one.reason.startswith("energy residual above 5% of the energy in play (the fastest is block ")
     assert (other.reason, other.summary.final_state_sha256) == (one.reason, one.summary.final_state_sha256)
+    last = max(read_checkpoint(path).head.position.step for path in (tmp_path / "run").glob("checkpoint.*"))
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["last_checkpoint"] == last
+    assert 0 < last < FIRST_CHECK  # the last one whose energy added up
     members = run_ensemble([soft(**wild), soft(), soft(**wild)])
     assert [end.outcome.status for end in members] == ["failed", "finished", "failed"]
     assert (members[0].outcome.reason, members[0].columns) == (one.reason, one.columns)
 
 
-@pytest.fixture
-def forced(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let every scene step fifty times as far as it safely can."""
-
-    def forced_build(scenario: Scenario) -> InitialScene:
-        built = build(scenario)
-        built.scene.world.controls[0].step *= 50.0
-        return built
-
-    monkeypatch.setattr(schemes, "build", forced_build)
-
-
-@pytest.mark.usefixtures("forced")
-def test_scene_that_blows_up_stops_and_names_step_block_and_checkpoint(soft: Shipped, tmp_path: Path) -> None:
-    often = CheckpointPolicy(checkpoint_steps=1)
-    result = simulate_into(soft(output__every=1.0), tmp_path / "run", precautions=often)
-    assert (result.status, result.summary.exit_code) == ("failed", ExitCode.NUMERICAL_FAILURE)
-    assert 0 < result.summary.steps <= 1000
-    assert f"step {result.summary.steps})" in result.reason
-    assert "block " in result.reason
-    last = max(read_checkpoint(path).head.position.step for path in (tmp_path / "run").glob("checkpoint.*"))
-    assert 0 < last < result.summary.steps
-    assert json.loads((tmp_path / "run" / "run.json").read_text())["last_checkpoint"] == last
-    assert not (tmp_path / "run" / "done.json").exists()
-
-
-@pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
-def test_overlap_names_the_pair_that_is_deepest(scheme: str) -> None:
-    result = simulate(sliding({"time": {"scheme": scheme}, "contact": {"max_overlap": 1e-12}}, end=0.01))
+def test_overlap_of_rigid_contacts_names_its_pair() -> None:
+    result = simulate(sliding({"time": {"scheme": "nonsmooth"}, "contact": {"max_overlap": 1e-12}}, end=0.01))
     assert result.summary.exit_code == ExitCode.NUMERICAL_FAILURE
     assert "(block below and the ground by " in result.reason or "(block below and block above by " in result.reason
     assert f"mm, step {result.summary.steps})" in result.reason
@@ -190,7 +147,7 @@ def test_what_failed_is_named_and_runs_that_did_not_fail_keep_their_words() -> N
     assert diagnose(BY_CODE[NOT_FINITE], NOT_FINITE, scene, placed).reason.endswith("(block above, step 0)")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP, signal.SIGUSR1])
 def test_signal_becomes_a_request_and_the_handler_comes_back(number: signal.Signals) -> None:
     before = signal.getsignal(number)
     with stop_requests() as is_stopped:
@@ -236,11 +193,10 @@ def test_runs_in_other_threads_leave_signals_alone() -> None:
     assert answers == [False]
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
-def test_being_terminated_is_like_ctrl_c_during_a_study(number: signal.Signals) -> None:
+def test_being_terminated_is_like_ctrl_c_during_a_study() -> None:
     with pytest.raises(KeyboardInterrupt), interruptible():
-        os.kill(os.getpid(), number)
-    assert signal.getsignal(number) is signal.SIG_DFL
+        os.kill(os.getpid(), signal.SIGHUP)
+    assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL
 
 
 COLUMNS, ROWS = 12, 18
