@@ -1,11 +1,7 @@
-"""Actuators: what they record, what they can exert, and that a run with one is resumed to the same bits.
-
-Forces on walls and energies of cycles are case V26.
-"""
+"""Actuators: what they record and what they can exert; forces on walls and energies of cycles are case V26."""
 
 from bisect import bisect_right
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,8 +9,7 @@ import pytest
 
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.models.actuators import PathTable, stretches_of
-from blocksim.simulation import simulate, simulate_into
-from tests.simulation.sliding import interrupted_at
+from blocksim.simulation import simulate
 
 both = pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
 WEIGHT = 1000 * 0.2 * 0.1 * 0.1 * 9.81  # N
@@ -105,18 +100,6 @@ def test_a_stiff_actuator_makes_the_step_shorter_in_both_schemes() -> None:
     for scheme in ("explicit", "nonsmooth"):
         steps = [simulate(pushed(scheme, end=1e-3, stiffness=k)).summary.time_step_s for k in (1e4, 1e9)]
         assert steps[1] < 0.5 * steps[0]
-
-
-@both
-def test_a_run_with_an_actuator_is_resumed_to_the_same_bits(scheme: str, tmp_path: Path) -> None:
-    whole = simulate_into(pushed(scheme), tmp_path / "whole")
-    half = whole.summary.steps // 2
-    interrupted_at(pushed(scheme), tmp_path / "parts", [half])
-    resumed = simulate_into(pushed(scheme), tmp_path / "parts", resume=True)
-    assert resumed.summary.resumed_from != ()
-    assert resumed.summary.final_state_sha256 == whole.summary.final_state_sha256
-    for column in ("force", "displacement", "work"):
-        assert np.array_equal(resumed.probes["jack"][column], whole.probes["jack"][column])
 
 
 @both

@@ -34,7 +34,6 @@ from blocksim.simulation.provenance import code_hashes
 from blocksim.simulation.schemes import ALONE, AnyScene, Team, build_scene
 from blocksim.world.build import arrays_of
 from tests.simulation.sliding import MODELS, assert_same, interrupted_at, sliding
-from tests.sizes import in_all
 
 SHARED = {"surface-linear", "outlines", "nonsmooth"}
 
@@ -79,20 +78,6 @@ def test_resumed_run_has_the_bits_of_a_continuous_one(tmp_path: Path, name: str)
     assert_same(whole, resumed)
 
 
-@pytest.mark.long
-@pytest.mark.usefixtures("two_threads")
-@pytest.mark.parametrize("threads", [1, 2])
-@pytest.mark.parametrize("name", MODELS)
-def test_fifty_interruptions_change_no_bit(tmp_path: Path, name: str, threads: int) -> None:
-    scenario = sliding(MODELS[name])
-    whole = simulate_into(scenario, tmp_path / "whole")
-    steps = points(whole, f"{name} {threads}", in_all(50))
-    interrupted_at(scenario, tmp_path / "parts", steps, threads)
-    resumed = simulate_into(scenario, tmp_path / "parts", resume=True, threads=threads)
-    assert resumed.summary.resumed_from == tuple(steps)
-    assert_same(whole, resumed)
-
-
 @pytest.mark.parametrize("name", ["surface-linear", "particles-hertz", "nonsmooth"])
 def test_lists_that_have_grown_come_back_as_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.setattr("blocksim.world.build.LEAST_PAIRS", 1)
@@ -103,17 +88,6 @@ def test_lists_that_have_grown_come_back_as_long(tmp_path: Path, monkeypatch: py
     stored = read_checkpoint(tmp_path / "parts" / "checkpoint.0").head.arrays
     assert [kind.shape for kind in stored] != [array.shape for array in arrays_of(build_scene(scenario))]
     assert_same(whole, simulate_into(scenario, tmp_path / "parts", resume=True))
-
-
-def test_checkpoints_threads_and_outputs_change_no_bit(tmp_path: Path) -> None:
-    scenario = sliding({}, end=0.002)
-    often = CheckpointPolicy(checkpoint_steps=7, checkpoint_time=1e-4, checkpoint_seconds=1e-3)
-    one = simulate_into(scenario, tmp_path / "one")
-    other = simulate_into(scenario, tmp_path / "other", precautions=often)
-    assert_same(one, other)
-    assert not [path for path in (tmp_path / "other").iterdir() if path.name.startswith(("checkpoint", "."))]
-    rare = simulate_into(sliding({}, end=0.002, every=0.00057), tmp_path / "rare", precautions=often)
-    assert rare.summary.final_state_sha256 == one.summary.final_state_sha256
 
 
 @pytest.fixture(scope="module")
@@ -302,7 +276,7 @@ def test_array_that_claims_to_fill_all_memory_is_refused(written: Path) -> None:
         read_checkpoint(forged(written, shape, b"'shape': (9" + b"9" * (len(shape) - 13) + b",)"))
 
 
-@pytest.mark.parametrize("shape", ["[-1,-4]", "[4294967296,4294967296]", "[1099511627776,1]", "[-4]"])
+@pytest.mark.parametrize("shape", ["[-1,-4]", "[4294967296,4294967296]"])
 def test_shapes_that_no_array_has_are_refused(written: Path, shape: str) -> None:
     old = f",{json.dumps(read_checkpoint(written).head.arrays[0].shape)}]".encode()
     stored = read_checkpoint(forged(written, old, f",{shape}]".encode()))
@@ -379,9 +353,8 @@ EVENTS = [
 ]
 
 
-def all_together(scheme: str, *, columns: int = 0, end: float = 0.02, **changes: Any) -> Scenario:
-    """Return a stack that settles, is loaded, pushed and shaken, beside so many others."""
-    piers = {"kind": "wall", "block": "brick", "rows": 3, "columns": columns, "left": 1.0, "bond": "stack", "gap": 0.02}
+def all_together(scheme: str, **changes: Any) -> Scenario:
+    """Return a stack that settles, is loaded, pushed and shaken."""
     ramp = {"kind": "ramp", "distance": 0.1, "speed": 1.0, "direction": "180 deg"}
     step, stiffness = ({"step": 1e-4}, {}) if scheme == "nonsmooth" else ({}, {"stiffness_scale": 0.01})
     data = {
@@ -389,7 +362,7 @@ def all_together(scheme: str, *, columns: int = 0, end: float = 0.02, **changes:
         "name": "together",
         "materials": {"stone": {"density": 2000.0, "young_modulus": "1 GPa", "poisson_ratio": 0.2}},
         "blocks": {"brick": {"width": 0.2, "height": 0.1, "length": 0.1, "material": "stone"}},
-        "structures": [{"kind": "stack", "block": "brick", "count": 3}, *([piers] if columns else [])],
+        "structures": [{"kind": "stack", "block": "brick", "count": 3}],
         "bodies": [
             {"block": "brick", "name": "post", "x": -0.25, "y": 0.05, "fixed": True},
             {"block": "brick", "name": "ram", "x": 0.32, "y": 0.15, "motion": ramp},
@@ -397,20 +370,15 @@ def all_together(scheme: str, *, columns: int = 0, end: float = 0.02, **changes:
         "motion": {"kind": "harmonic", "amplitude": 0.002, "frequency": 20.0, "ramp": 0.01},
         "friction": {"block_block": 0.6, "block_ground": 0.6},
         "contact": {"restitution": 0.0, **stiffness},
-        "time": {"scheme": scheme, "end": end, "stop_at_rest": False, **step},
+        "time": {"scheme": scheme, "end": 0.02, "stop_at_rest": False, **step},
         "output": {"every": 0.001, "contacts": True},
         "start": {"settle": True},
         "loads": LOADS,
         "events": EVENTS,
         "probes": PROBES,
+        "actuators": [{"name": "jack", "body": "1", "displacement": {"kind": "ramp", "to": "1 mm", "rate": "0.1 m/s"}}],
     }
     return scenario_from_mapping({**data, **changes})
-
-
-def assert_same_files(one: Path, other: Path) -> None:
-    """Assert that two folders have the same tables, byte for byte."""
-    names = ["final.csv", *(f"probe-{probe['name']}.csv" for probe in PROBES)]
-    assert {name: (one / name).read_bytes() for name in names} == {name: (other / name).read_bytes() for name in names}
 
 
 @both_schemes
@@ -429,22 +397,10 @@ def test_interruptions_at_and_beside_events_change_no_byte_nor_do_probes_and_con
     assert resumed.summary.events == whole.summary.events
     assert resumed.summary.movement == whole.summary.movement
     assert resumed.summary.warnings == ()
-    assert {f"probe-{probe['name']}.csv" for probe in PROBES} < set(resumed.summary.sha256)
-    assert_same_files(tmp_path / "parts", tmp_path / "whole")
+    for name in ("jack", *(probe["name"] for probe in PROBES)):
+        table = f"probe-{name}.csv"
+        assert table in resumed.summary.sha256
+        assert (tmp_path / "parts" / table).read_bytes() == (tmp_path / "whole" / table).read_bytes()
     unrecorded = simulate(all_together(scheme, probes=[], output={"every": 0.001}))
     assert unrecorded.summary.final_state_sha256 == whole.summary.final_state_sha256
     assert unrecorded.frames.x.tobytes() == whole.frames.x.tobytes()
-
-
-@pytest.mark.long
-@both_schemes
-def test_two_threads_and_a_change_to_them_on_the_way_change_no_byte(scheme: str, tmp_path: Path) -> None:
-    scenario = all_together(scheme, columns=75)
-    whole = simulate_into(scenario, tmp_path / "one")
-    two = simulate_into(scenario, tmp_path / "two", threads=2)
-    assert two.summary.threads == 2
-    assert_same(two, whole)
-    assert_same_files(tmp_path / "two", tmp_path / "one")
-    interrupted_at(scenario, tmp_path / "parts", [whole.summary.events[0].step])
-    assert_same(simulate_into(scenario, tmp_path / "parts", resume=True, threads=2), whole)
-    assert_same_files(tmp_path / "parts", tmp_path / "one")

@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError
+from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.kernels.common.jit import source_hash
 from blocksim.scenario import Scenario, load_scenario, placement
 from blocksim.simulation import Progress, Result, provenance, read_result, simulate_into
@@ -54,15 +54,22 @@ def test_folder_holds_what_the_design_promises_and_done_is_written_last(kept: Re
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == checksum
 
 
-def test_summary_tells_status_cost_versions_and_ledger(folder: Path) -> None:
+def test_summary_tells_status_cost_versions_code_and_ledger(folder: Path) -> None:
     told = json.loads((folder / "run.json").read_text())
     assert (told["status"], told["reason"], told["exit_code"]) == ("finished", "at rest", 0)
     assert told["simulated_time_s"] == pytest.approx(told["steps"] * told["time_step_s"])
     assert 0.0 < told["solver_seconds"] <= told["total_seconds"]
-    assert {"blocksim", "code", "python", "numpy", "numba", "h5py", "platform"} <= set(told["environment"])
     assert told["energy_J"]["relative_residual"] < 1e-3
     assert told["energy_J"]["friction"] > 0.0
     assert datetime.fromisoformat(told["ended_at"]).tzinfo is not None
+    made_by = told["environment"]
+    assert {"blocksim", "code", "numpy", "h5py", "platform"} <= set(made_by)
+    versions = (llvmlite.__version__, numba.__version__, platform.python_version())
+    assert tuple(made_by[name] for name in ("llvmlite", "numba", "python")) == versions
+    assert made_by["cpu"] == llvmlite.binding.get_host_cpu_name()
+    present = {name for name, is_there in llvmlite.binding.get_host_cpu_features().items() if is_there}
+    assert set() < set(made_by["cpu_features"].split()) <= present
+    assert {f"code_{room}": digest for room, digest in provenance.code_hashes().items()}.items() <= made_by.items()
 
 
 def test_resolved_scenario_runs_to_the_same_bits_from_its_own_folder_too(
@@ -111,11 +118,6 @@ def test_vanished_experiment_leaves_no_folder(soft: Shipped, tmp_path: Path) -> 
     with pytest.raises(InputMissingError, match=r"gone\.csv"):
         simulate_into(scenario.model_copy(update={"experiment": gone}), tmp_path / "run")
     assert not (tmp_path / "run").exists()
-
-
-def test_run_is_not_overwritten_unasked(folder: Path, soft: Shipped) -> None:
-    with pytest.raises(OutputExistsError, match="contains another run; --overwrite"):
-        simulate_into(soft(time__end=0.01), folder)
 
 
 def test_estimate_is_no_less_than_what_a_run_leaves(tmp_path: Path) -> None:
@@ -183,18 +185,13 @@ def test_rotation_counts_from_the_start_and_is_not_wrapped() -> None:
     assert row["right_mm"] - row["left_mm"] == pytest.approx(1e3 * (0.032 * np.cos(0.3) + 0.05 * np.sin(0.3)))
 
 
-def test_file_gives_the_table_back_to_the_last_bit(kept: Result, folder: Path, tmp_path: Path) -> None:
-    pd.testing.assert_frame_equal(as_frame(read_table(folder / "final.csv")), kept.final, check_exact=True)
-    columns = {name: ['a "b",\nc', "nan"] if name == "block" else [math.nan, -1e-17] for name in COLUMNS}
-    (tmp_path / "final.csv").write_text(csv_text(columns), encoding="utf-8")
-    assert repr(read_table(tmp_path / "final.csv")) == repr(columns)
-
-
-def test_csv_text_is_what_pandas_writes() -> None:
+def test_csv_text_is_what_pandas_writes_and_is_read_back_to_the_last_bit(tmp_path: Path) -> None:
     numbers = [0.1 + 0.2, -0.0, 1e16, 1e-5, 123456789.125, np.pi * 1e-300, math.inf, math.nan]
     names = ["1", "with, comma", 'with "quotes"', "two\nlines", "ä", " ", "#", "nan"]
     columns = {name: names if name == "block" else numbers for name in COLUMNS}
     assert csv_text(columns) == as_frame(columns).to_csv(index=False, lineterminator="\n")
+    (tmp_path / "final.csv").write_text(csv_text(columns), encoding="utf-8")
+    assert repr(read_table(tmp_path / "final.csv")) == repr(columns)
 
 
 DEEP = ("[" * 100_000, '{"name":' * 100_000, '{"steps": ' + "9" * 100_000 + "}")
@@ -254,16 +251,6 @@ def test_rooms_are_reported_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("blocksim.kernels.common.jit.source_hash", edited)
     after = provenance.code_hashes.__wrapped__()
     assert {room for room in after if after[room] != before[room]} == {"world"}
-
-
-def test_run_tells_versions_processor_and_code(kept: Result) -> None:
-    told = kept.summary.environment
-    versions = (llvmlite.__version__, numba.__version__, platform.python_version())
-    assert tuple(told[name] for name in ("llvmlite", "numba", "python")) == versions
-    assert told["cpu"] == llvmlite.binding.get_host_cpu_name()
-    present = {name for name, is_there in llvmlite.binding.get_host_cpu_features().items() if is_there}
-    assert set() < set(told["cpu_features"].split()) <= present
-    assert {f"code_{room}": digest for room, digest in provenance.code_hashes().items()}.items() <= told.items()
 
 
 def test_command_with_a_name_that_is_no_text_can_be_written(kept: Result, monkeypatch: pytest.MonkeyPatch) -> None:
