@@ -236,7 +236,7 @@ def test_contacts_and_weight_are_all_that_accelerates_blocks(soft: Shipped, mode
     deep = {"max_overlap": 5e-3, "particle_spacing": 4e-3 if model == "particles" else 1e-3}
     contact = {"model": model, "law": law, "stiffness_scale": scale, **deep}
     values = {f"contact__{key}": value for key, value in contact.items()}
-    end = 0.03 if law != "linear" else {"surface": 0.25, "particles": 0.06, "kernel": 0.12}[model]
+    end = 0.03 if law != "linear" else {"surface": 0.25, "particles": 0.04, "kernel": 0.08}[model]
     scenario = soft("three_blocks_nominal", time__end=end, output__contacts=True, output__every=EVERY_STEP, **values)
     result = simulate(scenario)
     assert result.reason == "end of simulated time"  # the last frame of a run that failed is two steps late
@@ -260,7 +260,7 @@ def test_impulses_and_weight_are_all_that_accelerates_blocks_without_springs(
     monkeypatch.setattr(
         "blocksim.world.nonsmooth.is_cut_at_impacts", lambda *_: False
     )  # no step is cut: a frame has the impulses of the last part
-    values = {"time__end": 0.5, "time__substeps": 1, "output__contacts": True, "output__every": EVERY_STEP}
+    values = {"time__end": 0.3, "time__substeps": 1, "output__contacts": True, "output__every": EVERY_STEP}
     result = simulate(soft("three_blocks_nonsmooth", contact__restitution=1.0, **values))
     found, expected = changes(result), accelerations(result)[1:]
     # velocities live half a step before positions; blocks in flight are shown half a kick later

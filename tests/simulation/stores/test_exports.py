@@ -68,8 +68,9 @@ def test_removed_blocks_and_frames_that_are_not_finite_are_not_drawn(tmp_path: P
     assert write_geojson(tmp_path / "end.geojson", replace(FRAMES, x=x, vx=vx), SCENARIO) == 2
     first = read_drawing(tmp_path / "end.geojson")[0]
     assert np.array(first.outline) == pytest.approx(1e-3 * corners(FRAMES, 3)[0, :3])
-    with pytest.raises(InvalidInputError, match="no frame to export"):
-        write_geojson(tmp_path / "end.geojson", replace(FRAMES, x=np.full_like(x, np.nan)), SCENARIO)
+    for write in (write_geojson, write_vtkhdf):
+        with pytest.raises(InvalidInputError, match="no frame to export"):
+            write(tmp_path / "none", replace(FRAMES, x=np.full_like(x, np.nan)), SCENARIO)
 
 
 def test_dxf_has_them_with_blocks_names_and_what_is_fixed(tmp_path: Path) -> None:
@@ -87,17 +88,15 @@ def test_dxf_has_them_with_blocks_names_and_what_is_fixed(tmp_path: Path) -> Non
     assert told[-1][1:] == ("key-stone", True)
 
 
-SLOPE = load_scenario(SCENARIOS / "slope.toml")
-LEVEL = load_scenario(SCENARIOS / "three_blocks.toml")
 CELLS = 4  # three blocks and the ground
 
 
-@pytest.fixture(params=[1, 7, 1 << 16], ids=lambda size: f"batch {size}")
+@pytest.fixture(params=[7, 1 << 16], ids=lambda size: f"batch {size}")
 def written(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Frames, Path]:
     """Give frames of three blocks and their file, written some blocks at once."""
     monkeypatch.setattr(exports, "BATCH", request.param)
     frames = toppling(3, steps=11)
-    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, LEVEL) == 11
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, SCENARIO) == 11
     return frames, tmp_path / "run.vtkhdf"
 
 
@@ -113,8 +112,9 @@ def test_parts_of_every_time_are_found_where_the_steps_say(written: tuple[Frames
         for frame in range(11):
             assert steps["NumberOfParts"][frame] == 1
             start = int(steps["PointOffsets"][frame])
-            points = group["Points"][start : start + int(group["NumberOfPoints"][0])]
-            np.testing.assert_allclose(points[:12, :2], 1e-3 * corners(frames, frame).reshape(-1, 2), atol=1e-15)
+            points = group["Points"][start : start + int(group["NumberOfPoints"][0]), :2].reshape(-1, 4, 2)
+            np.testing.assert_allclose(points[:3], 1e-3 * corners(frames, frame), atol=1e-15)
+            np.testing.assert_allclose(points[3:], support_quads(SCENARIO, frames.tracks[0]))
             first = int(steps["CellDataOffsets/rotation_deg"][frame])
             still, shown = [0.0, 0.0, 0.0], {name: values[first : first + CELLS] for name, values in cells.items()}
             way = np.stack([frames.x[frame] - frames.x[0], frames.y[frame] - frames.y[0], np.zeros(3)], axis=-1)
@@ -130,9 +130,9 @@ def test_parts_of_every_time_are_found_where_the_steps_say(written: tuple[Frames
 
 
 def test_cells_of_polygons_have_their_own_corners(tmp_path: Path) -> None:
-    wedge, hexagon = [(-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02)], regular(6, 0.02)
-    frames = polygons(toppling(3, steps=4), wedge, hexagon)
-    write_vtkhdf(tmp_path / "run.vtkhdf", frames, LEVEL)
+    hexagon = regular(6, 0.02)
+    frames = polygons(toppling(3, steps=4), WEDGE, hexagon)
+    write_vtkhdf(tmp_path / "run.vtkhdf", frames, SCENARIO)
     with h5py.File(tmp_path / "run.vtkhdf") as file:
         group = file["VTKHDF"]
         assert group["Types"][:].tolist() == [7, 7, 7, 9]
@@ -169,15 +169,6 @@ def values(data: Any, name: str) -> NDArray[Any]:
     return found
 
 
-def test_ground_and_walls_are_cells_where_they_are(tmp_path: Path) -> None:
-    frames = toppling(2, steps=3)
-    write_vtkhdf(tmp_path / "run.vtkhdf", frames, SLOPE)
-    quads = support_quads(SLOPE, frames.tracks[0])
-    with h5py.File(tmp_path / "run.vtkhdf") as file:
-        points = file["VTKHDF/Points"][int(file["VTKHDF/Steps/PointOffsets"][2]) :, :2]
-    np.testing.assert_allclose(points[8:].reshape(quads.shape), quads)
-
-
 def test_vtk_reads_back_names_and_the_contacts_of_every_finite_time(tmp_path: Path) -> None:
     names = ("Stein ä", "b", *HOSTILE)
     tables = [np.zeros(count, CONTACT_ROW) for count in (2, 0, 3, 1)]
@@ -188,7 +179,7 @@ def test_vtk_reads_back_names_and_the_contacts_of_every_finite_time(tmp_path: Pa
     frames = replace(toppling(len(names), steps=4), names=names, contacts=join_contacts(tables))
     frames.vx[2, 1] = np.inf  # a frame that neither file has
     assert frames.contacts is not None
-    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, LEVEL) == 3
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, SCENARIO) == 3
     assert write_contacts_vtkhdf(tmp_path / "contacts.vtkhdf", frames, frames.contacts) == 3
     with h5py.File(tmp_path / "run.vtkhdf") as stored:
         assert tuple(name.decode() for name in stored["blocksim/block_names"][:]) == names
@@ -209,10 +200,3 @@ def test_vtk_reads_back_names_and_the_contacts_of_every_finite_time(tmp_path: Pa
                 assert values(data, "force_on_a_N")[:, :2].tolist() == forces_on_a(rows).tolist()
                 assert values(data, "normal_force_N").tolist() == rows["normal_force"].tolist()
                 assert values(data, "overlap_mm") == pytest.approx(1e3 * rows["overlap"])
-
-
-def test_frames_of_which_none_is_finite_are_refused(tmp_path: Path) -> None:
-    frames = toppling(2, steps=4)
-    frames.x[:] = np.nan
-    with pytest.raises(InvalidInputError, match="no frame to export"):
-        write_vtkhdf(tmp_path / "other.vtkhdf", frames, LEVEL)
