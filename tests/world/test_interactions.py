@@ -16,7 +16,6 @@ from blocksim.world.interactions import (
     ContactClass,
     contact_classes,
     damping_ratio,
-    interaction,
     interaction_tables,
     interactions_of,
     restitution_of,
@@ -111,21 +110,6 @@ def table_of(of: Scenario) -> Records:
     return table
 
 
-def modulus(one: Mapping[str, float], two: Mapping[str, float]) -> float:
-    return 1.0 / sum((1.0 - m["poisson_ratio"] ** 2) / m["young_modulus"] for m in (one, two))
-
-
-def test_different_materials_add_their_compliances_and_the_shorter_depth_counts() -> None:
-    of = scenario()
-    _, paper, flat, wooden = classes(of)
-    assert interaction(of, flat, wooden).normal_stiffness == pytest.approx(modulus(ALUMINIUM, OAK) * 0.05, rel=1e-12)
-    assert interaction(of, paper, wooden).normal_stiffness == pytest.approx(modulus(ALUMINIUM, OAK) * 0.025, rel=1e-12)
-    shear = sum(
-        2.0 * (2.0 - m["poisson_ratio"]) * (1.0 + m["poisson_ratio"]) / m["young_modulus"] for m in (ALUMINIUM, OAK)
-    )
-    assert interaction(of, flat, wooden).shear_ratio == pytest.approx(4.0 / shear / modulus(ALUMINIUM, OAK), rel=1e-12)
-
-
 def rebound(ratio: float, exponent: float = 1.0) -> float:
     """Return the speed at which x'' = -x^n - 2 z (n x^(n-1))^(1/2) x' from x = 0, x' = 1 has no force any more.
 
@@ -148,7 +132,7 @@ def rebound(ratio: float, exponent: float = 1.0) -> float:
     return -float(motion.y_events[0][0][1])
 
 
-@pytest.mark.parametrize("ratio", [0.01, 0.1, 0.3, 0.5, 0.7, 0.72, 0.9, 0.999, 1.0, 1.001, 1.5, 3.0, 5.3])
+@pytest.mark.parametrize("ratio", [0.01, 0.3, 0.72, 0.999, 1.0, 1.001, 5.3])
 def test_closed_form_is_the_rebound_of_a_contact_that_cannot_pull(ratio: float) -> None:
     assert restitution_of(ratio) == pytest.approx(rebound(ratio), abs=1e-8)
 
@@ -166,12 +150,12 @@ def test_limits_are_an_undamped_contact_and_a_rebound_of_less_than_one_percent(l
     assert 0.0 < restitution_of(damping_ratio(0.0)) < 0.01
 
 
-@pytest.mark.parametrize("e", [SMALLEST_RESTITUTION, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.99])
+@pytest.mark.parametrize("e", [SMALLEST_RESTITUTION, 0.1, 0.5, 0.99])
 def test_hertzian_contact_rebounds_as_asked(e: float) -> None:
     assert rebound(damping_ratio(e, "hertz-mindlin"), 1.5) == pytest.approx(e, abs=1e-4)
 
 
-@pytest.mark.parametrize("e", [-1e-9, 1.0000001, 2.0, float("nan")])
+@pytest.mark.parametrize("e", [-1e-9, 1.0000001, float("nan")])
 def test_restitution_outside_zero_to_one_is_refused(e: float) -> None:
     with pytest.raises(ValueError, match="between 0 and 1"):
         damping_ratio(e)
