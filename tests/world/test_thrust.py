@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from blocksim.scenario import PlacedBody, Scenario, load_scenario, place_bodies, place_segments, scenario_from_mapping
+from blocksim.scenario import Scenario, load_scenario, place_bodies, place_segments, scenario_from_mapping
 from blocksim.simulation.rest_state import SettleError, settle
 from blocksim.simulation.run import simulate
 from blocksim.simulation.schemes import ALONE, build, build_scene
@@ -20,10 +19,9 @@ from blocksim.world.joints import ContactJoint, joints_of
 from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.rigid_step import USUAL_STEP, thrust_shift
 from blocksim.world.sag import loads_at_rest
-from tests.verification.test_arches import RADIUS, limit_analysis
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from tests.golden import Golden
 
@@ -42,67 +40,23 @@ def ring_of(*structures: Mapping[str, object], **values: object) -> Scenario:
     """Return a ring of 16 voussoirs on fixed abutments, at the step that it takes by itself."""
     time = {"time.step": "auto", "time.end": 1.0, "friction": {"block_block": 1.0, "block_ground": 1.0}}
     overrides = {**time, "structures": list(structures), **values}
-    return load_scenario(SCENARIOS / "tilting_arch.toml", overrides, allow_outside=True)
-
-
-def as_cells(**values: object) -> Scenario:
-    """Return the same ring drawn block by block."""
-    return ring_of({"kind": "polygons", "block": "voussoir", "cells": drawn_ring()}, **values)
+    return load_scenario(SCENARIOS / "tilting_arch.toml", overrides)
 
 
 def drawn_ring() -> list[dict[str, Any]]:
-    return [{"outline": corners_of(body), "fixed": body.fixed} for body in place_bodies(ring_of(RING))]
-
-
-def corners_of(body: PlacedBody) -> list[list[float]]:
-    """Return the corners (m) of a block that is not turned."""
-    assert body.angle == 0.0
-    return [[body.x + x, body.y + y] for x, y in body.corners]
-
-
-def as_outlines() -> Scenario:
-    """Return the same ring as bodies, each of its own block."""
+    """Return the cells of the same ring, block by block."""
     placed = place_bodies(ring_of(RING))
-    blocks = {
-        f"b{number}": {"outline": [list(corner) for corner in body.corners], "depth": 1.0, "material": "stone"}
-        for number, body in enumerate(placed)
-    }
-    bodies: Any = [
-        {"block": f"b{number}", "x": body.x, "y": body.y, "fixed": body.fixed} for number, body in enumerate(placed)
-    ]
-    return ring_of(blocks=blocks, bodies=bodies)
+    return [{"outline": [[one.x + x, one.y + y] for x, y in one.corners], "fixed": one.fixed} for one in placed]
 
 
-def drawing_of(cells: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return GeoJSON."""
-    features = [
-        {
-            "type": "Feature",
-            "properties": {"fixed": cell["fixed"]},
-            "geometry": {"type": "Polygon", "coordinates": [[*cell["outline"], cell["outline"][0]]]},
-        }
-        for cell in cells
-    ]
-    return {"type": "FeatureCollection", "features": features}
+def as_cells(*more: Mapping[str, object]) -> Scenario:
+    """Return the same ring drawn block by block, and more beside it."""
+    return ring_of({"kind": "polygons", "block": "voussoir", "cells": [*drawn_ring(), *more], "in_place": bool(more)})
 
 
-def test_one_ring_takes_one_step_however_it_is_declared(tmp_path: Path) -> None:
-    drawing = tmp_path / "ring.geojson"
-    drawing.write_text(json.dumps(drawing_of(drawn_ring())))
-    drawn = ring_of({"kind": "polygons", "block": "voussoir", "table": str(drawing)})
-    steps = [own_step(one) for one in (ring_of(RING), as_cells(), as_outlines(), drawn)]
-    assert steps == pytest.approx([steps[0]] * 4)
-    assert steps[0] < 0.1 * USUAL_STEP
-
-
-def test_ring_of_outlines_falls_at_the_tilt_of_limit_analysis() -> None:
-    pull, _ = limit_analysis(16, 0.15 * RADIUS, math.radians(162.0), 1.0, pulls=True)
-
-    def comes_to_rest(share: float) -> bool:
-        return is_settled(as_cells(**{"ground.tilt": f"{math.atan(share * pull)} rad", "start.settle": True}))
-
-    assert comes_to_rest(0.998)
-    assert not comes_to_rest(1.002)
+def test_one_ring_takes_one_step_however_it_is_declared() -> None:
+    assert own_step(as_cells()) == pytest.approx(own_step(ring_of(RING)))
+    assert own_step(as_cells()) < 0.1 * USUAL_STEP
 
 
 def column(count: int, **values: object) -> Scenario:
@@ -142,10 +96,8 @@ def test_constant_loads_lean_a_column_as_a_tilt_does() -> None:
 
 
 def test_what_nothing_carries_is_left_out_of_the_thrust_and_what_turns_freely_is_no_structure() -> None:
-    stone = {"block": "voussoir", "outline": [[0.0, 0.2], [0.02, 0.2], [0.0, 0.22]]}
-    cells = {"kind": "polygons", "block": "voussoir", "cells": [*drawn_ring(), stone], "in_place": True}
-    with_stone = thrust_shift(layout_of(ring_of(cells)))
-    assert with_stone == pytest.approx(thrust_shift(layout_of(as_cells())))
+    stone = {"outline": [[0.0, 0.2], [0.02, 0.2], [0.0, 0.22]]}
+    assert thrust_shift(layout_of(as_cells(stone))) == pytest.approx(thrust_shift(layout_of(as_cells())))
     on_its_corner = [[0.0, 0.0], [0.1, 0.15], [0.0, 0.3], [-0.1, 0.15]]
     alone = {"kind": "polygons", "block": "voussoir", "cells": [{"outline": on_its_corner}]}
     assert thrust_shift(layout_of(ring_of(alone))) == 0.0
@@ -212,7 +164,7 @@ def stack(count: int, **time: Any) -> CaseScene:
     return CaseScene(bodies, restitution=0.0, time=rigid)
 
 
-@pytest.mark.parametrize(("count", "substeps"), [(1, 4), (5, 1), (5, 4)])
+@pytest.mark.parametrize(("count", "substeps"), [(5, 1), (5, 4)])
 def test_column_sinks_by_what_is_reported(count: int, substeps: int) -> None:
     scene = stack(count, substeps=substeps)
     told = describe(scene.scenario()).rigid
@@ -253,7 +205,6 @@ def cube_on_two() -> Scenario:
     ("scenario", "is_warned"),
     [
         (heavy_on_light(5.0), False),
-        (heavy_on_light(100.0), True),
         (heavy_on_light(1000.0), True),
         (cube_on_two(), True),
     ],
@@ -270,21 +221,14 @@ def test_heavy_blocks_sink_into_light_ones_by_what_is_reported(scenario: Scenari
     assert bool(told.warning) is is_warned
 
 
-@pytest.mark.parametrize("ratio", [1e4, 1e6])
-def test_automatic_step_keeps_light_blocks_from_being_crushed(ratio: float) -> None:
-    unlike = heavy_on_light(ratio)
-    scenario = unlike.model_copy(update={"time": unlike.time.model_copy(update={"step": "auto", "end": 0.1})})
-    told = describe(scenario).rigid
-    assert told is not None
-    assert (told.warning, "light blocks carry heavy ones" in told.why) == ("", True)
-    assert Simulation(build_scene(scenario)).to_time(0.1).ledger_row()[-1] < 0.011 * 0.025
-
-
 @pytest.mark.parametrize("ratio", [30.0, 1e4])
 def test_automatic_step_holds_a_heavy_block_beside_the_middle_of_a_light_one_to_a_thousandth_of_it(
     ratio: float,
 ) -> None:
-    result = simulate(heavy_on_light(ratio, x=0.008, step="auto"))
+    scenario = heavy_on_light(ratio, x=0.008, step="auto")
+    told, result = describe(scenario).rigid, simulate(scenario)
+    assert told is not None
+    assert (told.warning, "light blocks carry heavy ones" in told.why) == ("", ratio > 100.0)
     frames = result.held
     assert frames is not None
     assert 0.0375 - frames.y[-1, 1] < 1e-3 * 0.025
@@ -296,9 +240,6 @@ def test_automatic_step_holds_a_heavy_block_beside_the_middle_of_a_light_one_to_
 def test_a_run_warns_of_a_heavy_block_that_has_come_to_lie_on_a_light_one(ratio: float, is_warned: bool) -> None:
     """Before the run nothing lies on anything, so that the step is the usual one of two blocks."""
     scenario = heavy_on_light(ratio, x=0.008, gap=1e-4, step="auto")
-    told = describe(scenario).rigid
-    assert told is not None
-    assert told.warning == ""
     result = simulate(scenario)
     assert result.status == "finished"
     assert ["a light block carries a heavy one" in text for text in result.summary.warnings] == [True] * is_warned
