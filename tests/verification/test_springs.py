@@ -2,89 +2,40 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from math import atan, atan2, cos, radians, sin, sqrt, tan
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from blocksim.bench.harness import pushed_wall
-from blocksim.kernels.common.arrays import AT_REST, REACHED, World
+from blocksim.kernels.common.arrays import REACHED, World
 from blocksim.scenario.geometry import Corners, centre_outline, regular, section_of
-from blocksim.verification import closed_forms as forms, energy
-from blocksim.verification.case import Setting, run_case
-from blocksim.verification.cases import choose_cases
-from blocksim.verification.collapse import FINAL, collapse
+from blocksim.verification import energy
+from blocksim.verification.case import Setting
 from blocksim.verification.impacts import LANDINGS
-from blocksim.verification.scene import GOLDEN, HEIGHT, WIDTH, CaseScene, Simulation, Throw, Thrower, kinetic_energy
+from blocksim.verification.scene import GOLDEN, HEIGHT, WIDTH, CaseScene, Simulation, Throw, Thrower
 from blocksim.world import nonsmooth
 from blocksim.world.build import build_world
 from blocksim.world.interactions import damping_ratio
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
     from numpy.typing import NDArray
 
     from tests.conftest import PaperBlock, Start
 
 G = 9.81
-BOTH = ["linear", pytest.param("hertz-mindlin", marks=pytest.mark.long)]
 PHASES = tuple((GOLDEN * k) % 1.0 for k in range(14))  # of a step; zero begins exactly at one
 
 
-@pytest.mark.parametrize("offset", [0.0, 1e-12, -1e-9])
-def test_aligned_stack_stands_on_two_points_per_face(start: Start, paper_block: PaperBlock, offset: float) -> None:
-    count = 4
-    height = paper_block.height
-    places = [{"x": offset * (i % 2), "y": (i + 0.5) * height} for i in range(count)]
-    stack = start(places).to_time(0.05)
-    assert stack.contacts == 2 * count
-    sag_of_one = forms.static_overlap(paper_block.mass, 2.0 * paper_block.point_stiffness)
-    tops = [0.0, *(float(y) for y in stack.bodies.y + height / 2)]
-    for i, (below, body) in enumerate(zip(tops, stack.bodies, strict=False)):
-        sag = below - (body.y - height / 2)
-        assert sag == pytest.approx((count - i) * sag_of_one, rel=1e-3)
-    assert np.abs(stack.bodies.x - [place["x"] for place in places]).max() < 1e-12
-    assert np.abs(stack.bodies.angle).max() < 1e-9
-    assert stack.kinetic < 1e-18
-
-
-@pytest.mark.parametrize("law", BOTH)
-@pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("e", [0.1, 0.9])
 @pytest.mark.parametrize("landing", LANDINGS)
-def test_where_in_a_step_a_contact_begins_does_not_matter(law: str, landing: str, e: float) -> None:
-    thrower = Thrower(Setting(law=law), e)
+def test_where_in_a_step_a_contact_begins_does_not_matter(landing: str, e: float) -> None:
+    thrower = Thrower(Setting(), e)
     for phase in PHASES:
         body = thrower.throw(Throw(LANDINGS[landing], phase=phase))
         assert body.vy == pytest.approx(e, abs=0.005), f"at phase {phase}"
         assert abs(body.spin) * WIDTH < 1e-9
-
-
-@pytest.mark.parametrize("law", BOTH)
-@pytest.mark.parametrize("speed", [0.1, 1.0, 10.0])
-@pytest.mark.parametrize("e", [0.3, 0.5, 0.8, 1.0])
-def test_impact_beside_the_centre_loses_the_asked_share_of_its_energy(law: str, speed: float, e: float) -> None:
-    """1 - e^2 of the energy along the normal, m_eff v^2/2.
-
-    The ratio of normal velocities at the corner is e only while the block hardly turns during the impact: a soft Hertz
-    contact at 10 m/s turns it by 3 degrees, its lever arm grows, and the corner leaves up to 0.07 v faster.
-    """
-    thrower = Thrower(Setting(law=law), e, speed)
-    before = kinetic_energy(thrower.world.bodies[0])
-    body = thrower.throw(Throw(radians(30.0)))
-    arm = forms.lowest_corner(WIDTH, HEIGHT, radians(30.0))[0]
-    along_normal = 0.5 * speed**2 / (1.0 / body.mass + arm**2 / body.inertia)
-    assert (before - kinetic_energy(body)) / along_normal == pytest.approx(1.0 - e**2, abs=0.004)
-
-
-def test_soft_blocks_come_to_rest_where_stiff_ones_do() -> None:
-    scene = collapse(Setting(), 0.0, scale=0.001).to_time(2.0)
-    assert scene.status == AT_REST
-    for block, x, tolerance, angle in FINAL:
-        assert 1e3 * scene.bodies[block - 1].x == pytest.approx(x, abs=tolerance)
-        assert np.degrees(scene.bodies[block - 1].angle) == pytest.approx(angle, abs=0.5)
 
 
 SQUEEZE, OFFSET = 1e-4, 1e-8  # m: overlap of a block between two others, and its start off the middle
@@ -137,10 +88,9 @@ def test_wedge_slides_in_between_jaws_with_the_force_of_limit_equilibrium(fricti
     assert run.bodies.vx[1] == pytest.approx(sinks * run.time * tan(BETA), rel=1e-3)
 
 
-@pytest.mark.parametrize("corners", [3, 6])
 @pytest.mark.parametrize(("degrees", "slides"), [(-0.5, False), (0.5, True)])
-def test_slope_holds_a_polygon_below_the_friction_angle_only(corners: int, degrees: float, slides: bool) -> None:
-    outline, tilt = regular(corners, RADIUS), atan(0.3) + radians(degrees)
+def test_slope_holds_a_polygon_below_the_friction_angle_only(degrees: float, slides: bool) -> None:
+    outline, tilt = regular(6, RADIUS), atan(0.3) + radians(degrees)
     lifted = tuple((x, y - min(y for _, y in outline)) for x, y in outline)
     values: dict[str, object] = {"ground_friction": 0.3, "tilt": -tilt, "contact": {"stiffness_scale": 0.01}}
     run = CaseScene([table(lifted)], restitution=0.0, **values).start().to_time(0.05)  # type: ignore[arg-type]
@@ -171,27 +121,14 @@ def test_hexagon_that_rolls_onto_its_next_face_keeps_eleven_seventeenths_of_its_
     assert spins[fall + 15] / spins[fall - 15] == pytest.approx(11.0 / 17.0, rel=0.01)
 
 
-# work space
-
-
 def motion_bits(scene: Simulation) -> dict[str, bytes]:
     """Return the bits of all that moves, and of what the contacts remember."""
     names = ("x", "y", "angle", "cos", "sin", "vx", "vy", "spin", "ax", "ay", "spin_rate")
     return {name: scene.bodies[name].tobytes() for name in names} | {"contacts": scene.contact_records.tobytes()}
 
 
-@pytest.mark.parametrize(
-    "contact",
-    [
-        {"stiffness_scale": 1e-3},
-        pytest.param({"stiffness_scale": 1e-3, "law": "hertz-mindlin"}, marks=pytest.mark.long),
-        pytest.param(
-            {"stiffness_scale": 1e-4, "model": "kernel", "particle_spacing": 4e-3, "max_overlap": 5e-3},
-            marks=pytest.mark.long,
-        ),
-    ],
-)
-def test_a_crowd_moves_the_same_to_the_last_bit_with_any_skin_of_the_scenario(contact: dict[str, object]) -> None:
+def test_a_crowd_moves_the_same_to_the_last_bit_with_any_skin_of_the_scenario() -> None:
+    contact = {"stiffness_scale": 1e-3}
     usual = float(build_world(pushed_wall(5, 8, contact=contact)).controls[0].skin)
     ends, rebuilds = [], []
     for share in (0.5, 1.0, 3.0):
@@ -204,23 +141,7 @@ def test_a_crowd_moves_the_same_to_the_last_bit_with_any_skin_of_the_scenario(co
     assert rebuilds[0] > rebuilds[1] > rebuilds[2] > 10
 
 
-@pytest.mark.parametrize(("slope", "slides"), [(0.3, False), (0.5, True)])
-def test_friction_history_survives_a_new_pair_list(
-    start: Start, paper_block: PaperBlock, slope: float, slides: bool
-) -> None:
-    seldom, often = (
-        start([{"y": paper_block.height / 2}], tilt=-slope, contact={"skin": skin}).to_time(0.02)
-        for skin in (1e-2, 4e-6)
-    )
-    assert seldom.status == often.status == REACHED
-    assert seldom.world.clock[0].rebuilds == 1
-    assert not slides or often.world.clock[0].rebuilds > 20
-    assert motion_bits(seldom) == motion_bits(often)
-    assert abs(often.contact_records.shear_force).min() > 0.05
-
-
 SETTING = Setting(scheme="nonsmooth")
-LONG = pytest.mark.long
 
 
 def peaks(width: float, height: float, restitution: float) -> NDArray[np.float64]:
@@ -245,12 +166,8 @@ def peaks(width: float, height: float, restitution: float) -> NDArray[np.float64
     ("width", "height", "restitution", "exact", "within"),
     [
         (0.01, 0.04, 0.5, [0.09473264, 0.07505532, 0.06027335, 0.04882257], 2e-3),
-        pytest.param(0.2, 0.8, 0.5, [0.09473368, 0.07505675, 0.06027485, 0.04882402], 2e-3, marks=LONG),
         (0.032, 0.05, 0.0, [0.07366564, 0.02247022, 0.007063936, 0.002239554], 2e-3),
-        (0.05, 0.1, 0.2, [0.09569742, 0.04432495, 0.02120317, 0.01027485], 2e-3),
-        (0.032, 0.05, 0.6, [0.06995812, 0.01919229, 0.009446361, 0.002983621], 5e-3),  # from here on it hops
-        (0.032, 0.05, 0.8, [0.06595171, 0.01310729, 0.04265208, 0.008739528], 5e-3),
-        (0.0125, 0.05, 0.8, [0.09462656, 0.07491297, 0.06012387, 0.04867926], 5e-3),
+        (0.032, 0.05, 0.8, [0.06595171, 0.01310729, 0.04265208, 0.008739528], 5e-3),  # it hops
     ],
 )
 def test_rocking_peaks_at_the_default_step_are_those_of_exact_impact_times(
@@ -261,54 +178,6 @@ def test_rocking_peaks_at_the_default_step_are_those_of_exact_impact_times(
     At 0.8 a restitution of 0.80008 would move the fourth peak of the squat block by 0.9 %.
     """
     assert peaks(width, height, restitution) == pytest.approx(exact, rel=within)
-
-
-def test_third_apex_of_a_drop_is_within_a_percent_at_the_default_step() -> None:
-    """The table allows 4 % there; at 1 ms it is 5 % off."""
-    third = run_case(choose_cases(["V3"], SETTING)[0], SETTING).rows[2]
-    assert third.quantity == "apex 3"
-    assert abs(third.error) < 0.01
-
-
-@dataclass(frozen=True)
-class Wrong(Setting):
-    """A setting whose scenes are changed."""
-
-    change: Callable[[CaseScene], CaseScene] = lambda scene: scene
-
-    def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> CaseScene:
-        """Return the scene that is wrong."""
-        return self.change(super().scene(bodies, **values))
-
-
-def times(name: str, factor: float) -> Callable[[CaseScene], CaseScene]:
-    return lambda scene: replace(scene, **{name: factor * getattr(scene, name)})
-
-
-WRONG: dict[str, tuple[Callable[[CaseScene], CaseScene], str]] = {  # and which cases have to notice it
-    "restitution": (times("restitution", 0.95), "V3 V4 V5 V16"),
-    "friction of the ground": (times("ground_friction", 1.03), "V7 V8 V9 V10 V17"),
-    "no friction of the ground": (times("ground_friction", 0.0), "V12"),
-    "little friction of the ground": (times("ground_friction", 0.01), "V18"),
-    "friction of blocks": (times("friction", 1.2), "V22"),
-    "gravity": (times("gravity", 1.01), "V1 V24"),
-    "more gravity": (times("gravity", 1.03), "V11"),
-    "ground that leans": (lambda scene: replace(scene, tilt=-0.03), "V13"),
-    "an impact not solved": (lambda scene: replace(scene, time={**scene.time, "velocity_sweeps": 1}), "V6"),
-}
-
-
-@pytest.mark.parametrize(
-    ("name", "case_id"),
-    [  # what a case can notice changes with the case alone
-        pytest.param(name, case_id, marks=() if case_id in {"V6", "V13"} else LONG)
-        for name, (_, ids) in WRONG.items()
-        for case_id in ids.split()
-    ],
-)
-def test_a_case_notices_what_is_wrong(name: str, case_id: str) -> None:
-    (case,) = choose_cases([case_id], SETTING)
-    assert any(not row.is_inside for row in run_case(case, Wrong(scheme="nonsmooth", change=WRONG[name][0])).rows)
 
 
 def test_energy_that_friction_took_and_nobody_tallied_is_noticed() -> None:
