@@ -34,6 +34,7 @@ from blocksim.simulation.provenance import code_hashes
 from blocksim.simulation.schemes import ALONE, AnyScene, Team, build_scene
 from blocksim.world.build import arrays_of
 from tests.simulation.sliding import MODELS, assert_same, interrupted_at, sliding
+from tests.sizes import in_all
 
 SHARED = {"surface-linear", "outlines", "nonsmooth"}
 
@@ -57,18 +58,19 @@ def points(whole: Result, seed: str, count: int) -> list[int]:
     return sorted(np.random.default_rng([*map(ord, seed)]).choice(steps, count, replace=False).tolist())
 
 
-def sliding_seen(name: str, end: float = 0.02) -> Scenario:
+def sliding_seen(name: str) -> Scenario:
     """Return a model's scenario with its contacts recorded."""
-    return sliding({**MODELS[name], "output": {"contacts": True}}, end=end)
+    return sliding({**MODELS[name], "output": {"contacts": True}}, end=0.02)
 
 
 @pytest.mark.usefixtures("two_threads")
+@pytest.mark.parametrize("count", [3, pytest.param(in_all(50), marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", MODELS)
-def test_resumed_run_has_the_bits_of_a_continuous_one(tmp_path: Path, name: str) -> None:
+def test_resumed_run_has_the_bits_of_a_continuous_one(tmp_path: Path, name: str, count: int) -> None:
     """Also where two threads have run the parts and one goes on: kernels of particles are not compiled for teams."""
     scenario = sliding_seen(name)
     whole = simulate_into(scenario, tmp_path / "whole")
-    steps = points(whole, name, 3)
+    steps = points(whole, name, count)
     stopped = interrupted_at(scenario, tmp_path / "parts", steps, 2 if name in SHARED else 1)
     resumed = simulate_into(scenario, tmp_path / "parts", resume=True)
     assert stopped == steps
