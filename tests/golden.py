@@ -32,9 +32,7 @@ SLASH = " / "
 # keeps nine digits of numbers, as mathematical functions may end in other bits elsewhere.
 RULES: dict[str, tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]] = {
     "times": (re.compile(r"\b\d+(?:\.\d+)?(?:e-?\d+)? (?:us|ms|s|min|h)\b"), "TIME"),
-    "dates": (re.compile(r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?(?:\.\d+)?(?:Z|[+-]\d\d:?\d\d)?)?"), "DATE"),
     "sizes": (re.compile(r"\b\d+(?:\.\d+)? (?:B|kB|KB|KiB|MB|MiB|GB|GiB)\b"), "SIZE"),
-    "versions": (re.compile(r"\b\d+\.\d+(?:\.\d+)*(?:(?:a|b|rc|\.dev|\.post)\d+)?\b"), "VERSION"),
     "hashes": (re.compile(r"(?<!\.)\b[0-9a-f]{12,64}\b"), "HASH"),
     "counts": (re.compile(r"\b\d+(?= (?:frames|steps|stored|now)\b)"), "COUNT"),
     "numbers": (re.compile(r"\b\d+\.\d+(?:e[+-]?\d+)?\b"), "NUMBER"),

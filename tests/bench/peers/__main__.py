@@ -19,13 +19,12 @@ from tests.bench.peers.bricks import BRICKS
 from tests.bench.peers.engine import Readings
 from tests.bench.peers.heap import HEAP
 from tests.bench.peers.three_blocks import PAPER, WITHOUT_RESTITUTION
-from tests.bench.peers.wall import WALL
 from tests.bench.peers.work_precision import draw_work_precision
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-PEERS = (PAPER, WITHOUT_RESTITUTION, BRICKS, WALL, HEAP)
+PEERS = (PAPER, WITHOUT_RESTITUTION, BRICKS, HEAP)
 PACKAGES = {"pymunk": "pymunk", "Box2D": "box2d"}  # module: name of its package
 
 

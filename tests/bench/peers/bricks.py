@@ -1,28 +1,52 @@
 """Walls of 100 and 1000 bricks by engines with rigid contacts: time a brick and step, and time at equal accuracy.
 
-The walls are pushed, as in `wall`. For 0.2 s small differences hardly grow, so accuracy is judged brick by brick, by
-the mean distance of the centres from where the same engine has them with its finest setting. At equal accuracy every
-engine takes the longest step with which it is as near to its own finest answer as the non-smooth scheme is to its own
-at steps of 1 ms in 4 substeps.
+The walls are pushed in proportion to height. For 0.2 s small differences hardly grow, so accuracy is judged brick by
+brick, by the mean distance of the centres from where the same engine has them with its finest setting. At equal
+accuracy every engine takes the longest step with which it is as near to its own finest answer as the non-smooth scheme
+is to its own at steps of 1 ms in 4 substeps.
 """
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from blocksim.bench.harness import Benchmark, Effort, Number, Readings, TimeSteps, single
+from blocksim.bench.harness import (
+    LOW_COURSES,
+    WALL_RESTITUTION,
+    Benchmark,
+    Effort,
+    Number,
+    Readings,
+    TimeSteps,
+    pushed_wall,
+    single,
+)
 from tests.bench.peers import box2d_v3
-from tests.bench.peers.engine import Box2D, Nonsmooth, Pymunk
+from tests.bench.peers.engine import Box2D, Nonsmooth, Pymunk, Scene, raced
 from tests.bench.peers.series import BOX2D, BOX2D_V3, NONSMOOTH, PYMUNK, RACE_STEP
-from tests.bench.peers.wall import Size, raced
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from tests.bench.peers.engine import Final, Solver
+
+
+class Size(NamedTuple):
+    """A wall, and how long it is watched."""
+
+    columns: int
+    rows: int
+    end: float  # s
+
+    def scene(self) -> Scene:
+        """Return it, let go."""
+        make = functools.partial(pushed_wall, self.columns, self.rows, upright=LOW_COURSES)
+        return Scene(make, np.zeros(self.columns * self.rows), WALL_RESTITUTION, self.end)
+
 
 WALLS, SMALL = (Size(10, 10, 1.0), Size(40, 25, 1.0)), (Size(5, 4, 0.1),)
 SOON = 0.2  # s

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.bench import harness
-from blocksim.bench.harness import FRICTION, Rerun
+from blocksim.bench.harness import FRICTION, Number, Rerun
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.geometry import edges_of
 from blocksim.simulation.loop import last_step_of
@@ -134,6 +134,21 @@ def timed(call: Callable[..., object], arguments: tuple[Any, ...], count: int) -
     for _ in range(count):
         call(*arguments)
     return time.process_time() - began
+
+
+def raced(
+    racers: Mapping[str, Solver], scene: Callable[[], Scene], rounds: int
+) -> tuple[list[Number], dict[str, Final]]:
+    """Return the CPU time of the first one, and how many times as long the others take; and the last finals of all.
+
+    They run in turns, so that what else the machine does slows all of them.
+    """
+    finals = [{name: solver.solve(scene()) for name, solver in racers.items()} for _ in range(rounds)]
+    first, *others = racers
+    own = Number(f"{first}, {racers[first].setting}", "CPU s", tuple(one[first].seconds for one in finals))
+    ratios = [tuple(one[name].seconds / one[first].seconds for one in finals) for name in others]
+    numbers = [own, *(Number(f"{name}: times that", "", ratio) for name, ratio in zip(others, ratios, strict=True))]
+    return numbers, finals[-1]
 
 
 def call_time(stepper: Stepper, empty: Any) -> float:

@@ -14,11 +14,8 @@ if TYPE_CHECKING:
 PYMUNK, BOX2D, BOX2D_V3, EXPLICIT, NONSMOOTH = "pymunk", "Box2D", "Box2D v3", "explicit", "non-smooth"
 STEPS = (4e-3, 2.8e-3, 2e-3, 1.4e-3, 1e-3, 7e-4, 5e-4, 2e-4, 1e-4, 5e-5)  # s
 SCALES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1)
-WALL_STEPS = (4e-3, 2e-3, 1e-3, 5e-4)  # s
-WALL_SCALES = (2.5e-4, 1e-3, 4e-3)  # four times the stiffness is half the step; softer blocks overlap too far
-WALL_PARTED = (1e-3, 5e-4, 2.5e-4)  # s, in four parts each: with longer ones blocks overlap too far
 RACE_STEP = 1e-3  # s
-QUICK_LEVELS, QUICK_WALL_LEVELS = 3, 2
+QUICK_LEVELS = 3
 
 
 def three_blocks_series(restitution: float, *, quick: bool) -> tuple[Series, ...]:
@@ -49,42 +46,17 @@ def three_blocks_series(restitution: float, *, quick: bool) -> tuple[Series, ...
     return tuple(Series(engine, label, levels, references[engine]) for engine, label, levels in found)
 
 
-def wall_series(*, quick: bool) -> tuple[Series, ...]:
-    """Return every engine; the finest level is the reference."""
-    count = QUICK_WALL_LEVELS if quick else len(WALL_STEPS)
-    steps, scales, parted = WALL_STEPS[:count], WALL_SCALES[:count], WALL_PARTED[:count]
-    found: list[tuple[str, str, tuple[Solver, ...]]] = [
-        *((PYMUNK, f"pymunk, {n} iterations", _stepped(Pymunk, steps, n)) for n in (10, 30)),
-        (BOX2D, "Box2D, 10 iterations", _stepped(Box2D, steps, 10)),
-        (NONSMOOTH, f"non-smooth, {_parts(4)}", _nonsmooth(parted, 4, UNTIL_SOLVED)),
-        (EXPLICIT, "explicit", _explicit(scales, 0.1)),
-    ]
-    return tuple(Series(engine, label, levels, levels[-1]) for engine, label, levels in found)
-
-
-def wall_racers() -> dict[str, Solver]:
-    """Return those that are timed in turns at the same step, the non-smooth scheme first."""
-    return {
-        NONSMOOTH: Nonsmooth(TimeSteps(RACE_STEP)),
-        **{f"{PYMUNK}, {n} iterations": Pymunk(RACE_STEP, n) for n in (10, 30)},
-        f"{BOX2D}, 10 iterations": Box2D(RACE_STEP, 10),
-        **_third_racer(),
-    }
-
-
 def heap_racers() -> dict[str, Solver]:
-    """Return those that are timed in turns on the heap, the non-smooth scheme first."""
+    """Return those that are timed in turns on the heap, the non-smooth scheme first.
+
+    Box2D v3, where it is at hand, has as many substeps as that.
+    """
     return {
         NONSMOOTH: Nonsmooth(TimeSteps(RACE_STEP)),
         f"{BOX2D}, 10 iterations": Box2D(RACE_STEP, 10),
         f"{PYMUNK}, 10 iterations": Pymunk(RACE_STEP, 10),
-        **_third_racer(),
+        **({} if library() is None else {f"{BOX2D_V3}, 4 substeps": Box2Dv3(RACE_STEP, 4, STIFF)}),
     }
-
-
-def _third_racer() -> dict[str, Solver]:
-    """Return Box2D v3 with as many substeps as the non-smooth scheme, nothing where it is not at hand."""
-    return {} if library() is None else {f"{BOX2D_V3}, 4 substeps": Box2Dv3(RACE_STEP, 4, STIFF)}
 
 
 def _stepped(engine: type[Pymunk | Box2D], steps: tuple[float, ...], iterations: int) -> tuple[Solver, ...]:

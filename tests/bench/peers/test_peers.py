@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 
 from blocksim.bench.harness import Benchmark, Effort, TimeSteps, single
-from tests.bench.peers import __main__ as script, three_blocks as three_blocks_peers, wall
+from tests.bench.peers import __main__ as script, three_blocks as three_blocks_peers
 from tests.bench.peers.__main__ import main
 from tests.bench.peers.box2d_v3 import MISSING, STIFF, VARIABLE, Box2Dv3, library
 from tests.bench.peers.bricks import BRICKS
 from tests.bench.peers.engine import Box2D, Explicit, Final, Nonsmooth, Pymunk, Readings, Scene, Series, Solver
-from tests.bench.peers.heap import HEAP
-from tests.bench.peers.series import wall_series
+from tests.bench.peers.heap import HEAP, wasserstein
 from tests.bench.peers.three_blocks import starts
-from tests.bench.peers.wall import wasserstein
 from tests.bench.peers.work_precision import SMALLEST_SHARE, Curve, Panel, draw_work_precision, floor_of
 
 if TYPE_CHECKING:
@@ -112,7 +110,7 @@ def test_what_is_no_library_of_the_third_box2d_is_wrong_usage(
     monkeypatch.setenv(VARIABLE, path)
     library.cache_clear()
     with pytest.raises(SystemExit):
-        main(["wall"])
+        main(["heap"])
     library.cache_clear()
     assert told in capsys.readouterr().err
 
@@ -140,18 +138,7 @@ def test_wasserstein_distance_is_the_area_between_cumulative_curves() -> None:
     assert wasserstein(one, np.flip(one)) == 0.0
 
 
-def test_a_wall_is_measured_by_blocksim_alone_where_it_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    series = tuple(one for one in wall_series(quick=True) if one.engine == "explicit")
-    monkeypatch.setattr(wall, "wall_series", lambda **_: series)
-    monkeypatch.setattr(wall, "wall_racers", lambda: {"made up": Shifted(1.0)})
-    found = wall.WALL.measure(QUICK)
-    coarse, fine, change, _ = found.numbers
-    assert 0.0 < coarse.median < fine.median
-    assert 0.0 < change.median < 2.0
-    assert found.details[1]["change_x_mm"] is None
-
-
-@pytest.mark.parametrize("arguments", [["heap"], ["wals"]], ids=["package", "name"])
+@pytest.mark.parametrize("arguments", [["heap"], ["haep"]], ids=["package", "name"])
 def test_a_missing_package_and_an_unknown_name_are_wrong_usage(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:
@@ -161,7 +148,7 @@ def test_a_missing_package_and_an_unknown_name_are_wrong_usage(
         monkeypatch.setitem(sys.modules, "Box2D", None)
     with pytest.raises(SystemExit):
         main(arguments)
-    told = "package box2d is missing" if arguments == ["heap"] else "did you mean 'wall'?"
+    told = "package box2d is missing" if arguments == ["heap"] else "did you mean 'heap'?"
     assert told in capsys.readouterr().err
 
 
