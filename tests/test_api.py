@@ -6,7 +6,6 @@ import pydoc
 import re
 import struct
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ import pytest
 
 import blocksim
 from blocksim.cli.commands import load_command
-from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError
+from blocksim.errors import InvalidInputError, ScenarioError
 from blocksim.options import option_fields
 from blocksim.simulation import Result
 from blocksim.study.calibrate_plan import CalibrateOptions
@@ -107,11 +106,6 @@ def test_a_comparison_shows_in_a_notebook_as_its_table(slide: Result, tmp_path: 
     assert "samples inside all ranges" in blocksim.compare(folder, tmp_path / "a<b>.csv")._repr_html_()
 
 
-def test_a_data_set_and_tables_have_their_types() -> None:
-    assert inspect.signature(Result.to_xarray).return_annotation == "xr.Dataset"
-    assert inspect.signature(Result.to_frame).return_annotation == "pd.DataFrame"
-
-
 def test_a_scenario_from_dictionaries_is_that_of_the_file() -> None:
     data = tomllib.loads(SLIDE.read_text(encoding="utf-8"))
     assert blocksim.load(data) == blocksim.load(SLIDE)
@@ -179,38 +173,6 @@ def test_pictures_animations_and_reports_are_made_of_results(tmp_path: Path, mon
     assert "slide" in blocksim.report(kept).read_text(encoding="utf-8")
 
 
-def test_a_file_of_others_is_not_replaced_by_a_picture(tmp_path: Path) -> None:
-    kept = blocksim.run(blocksim.load(SLIDE, {**SOFT, "time.end": 0.01}), out=tmp_path / "kept")
-    (tmp_path / "thesis.pdf").write_text("mine")
-    with pytest.raises(OutputExistsError, match="already exists"):
-        blocksim.plot(kept, tmp_path / "thesis.pdf")
-    assert (tmp_path / "thesis.pdf").read_text() == "mine"
-
-
 def test_picture_of_a_result_that_was_not_kept_says_what_to_do(slide: Result) -> None:
     with pytest.raises(InvalidInputError, match="run it with out=FOLDER"):
         blocksim.plot(slide)
-
-
-@pytest.mark.parametrize("draw", [blocksim.plot, blocksim.animate])
-def test_an_unknown_colour_is_an_error_with_the_choices(tmp_path: Path, draw: Callable[..., Path]) -> None:
-    kept = blocksim.run(blocksim.load(SLIDE, {**SOFT, "time.end": 0.01}), out=tmp_path / "kept")
-    with pytest.raises(InvalidInputError, match="unknown colour 'red' in this run; choose block, material, sp"):
-        draw(kept, tmp_path / "a.gif" if draw is blocksim.animate else tmp_path / "a.png", colour="red")
-
-
-def test_sensitivity_takes_a_scenario_and_plain_ranges() -> None:
-    found = blocksim.sensitivity(blocksim.load(SLIDE, SOFT), {"gravity": {"from": 9.7, "to": 9.9}}, samples=2)
-    assert set(found.to_frame()["key"]) == {"gravity"}
-    with pytest.raises(InvalidInputError, match="unknown method 'moris'"):
-        blocksim.sensitivity(SLIDE, method="moris")
-
-
-def test_calibrate_takes_a_file_and_priors(tmp_path: Path) -> None:
-    prior = {"contact.restitution": {"from": 0.2, "to": 0.35}}
-    found = blocksim.calibrate(
-        blocksim.load(ROOT / "scenarios" / "three_blocks.toml", {"contact.stiffness_scale": 0.01}),
-        prior, {"structures.0.overlap": {"mean": "10 mm", "sd": "0.3 mm"}},
-        trials=2, members=2, fresh_members=4, out=tmp_path / "fitted.toml",
-    )  # fmt: skip
-    assert blocksim.load(found.path, allow_outside=True).name == "three_blocks"

@@ -10,7 +10,6 @@ from typing import Any
 
 import h5py
 import pytest
-from PIL import Image
 
 from blocksim.scenario import Document
 from blocksim.simulation.observables import table_columns
@@ -142,17 +141,6 @@ def test_the_last_frame_is_reached_by_the_time_printed_above_it(blocksim: Comman
         for at in (printed[0], f"{printed[0]} s", f"{1000.0 * float(printed[0]):.0f} ms"):
             assert blocksim("plot", finished, "--kind", kind, "--at", at, "--out", "end.svg").code == 0
             assert f"<!-- {printed[0]} s, final -->" in Path("end.svg").read_text(encoding="utf-8")
-
-
-def test_page_frames_and_colours_are_those_asked_for(blocksim: Command, finished: Path) -> None:
-    look = ("--frames", 4, "--colour", "speed", "--size", "640x480px", "--dpi", 80)
-    assert blocksim("plot", finished, *look, "--out", "strip.png").code == 0
-    with Image.open("strip.png") as picture:
-        assert picture.size == (640, 480)
-    assert blocksim("plot", finished, *look[:4], "--out", "strip.svg").code == 0
-    texts = Path("strip.svg").read_text(encoding="utf-8")
-    assert len(re.findall(r"<!-- [0-9.]+ s(?:, \w+)? -->", texts)) == 4
-    assert "<!-- speed (m/s) -->" in texts
 
 
 SOLVER_FREE = """

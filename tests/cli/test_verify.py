@@ -1,24 +1,17 @@
 """verify-run runs stored results again, verify the cases: agreement, every kind of difference, and damage."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import h5py
 import pytest
 
 from blocksim.simulation.files import sha256_of
-from blocksim.study.limit import limit
-from blocksim.study.manifest import read_entries
 from blocksim.verification import cases
 from blocksim.verification.case import Case, Row, Setting
 from tests.cli.conftest import Command
 from tests.golden import Golden
-from tests.study.plans import SQUAT, block_on_a_slope
 
-X = "1.x_mm"
-TILT: dict[str, Any] = {"ground.tilt": {"from": "5 deg", "to": "40 deg", "count": 2}}
 BRIEF = ("contact.stiffness_scale=0.001", "time.end=0.02")
 SHORT = ("--set", BRIEF[0], "--set", BRIEF[1])
 
@@ -129,17 +122,6 @@ def test_other_versions_and_processors_are_reported_and_another_scenario_though_
         assert told in answer.out
 
 
-def test_runs_of_a_study_that_were_moved_are_told(blocksim: Command, tmp_path: Path) -> None:
-    limit(block_on_a_slope(SQUAT), TILT, out=tmp_path / "study", tolerance=0.5)
-    manifest = tmp_path / "study" / "manifest.jsonl"
-    entries = [entry for _, entry in read_entries(manifest)]
-    moved = [{X: float(str(one.row[X])) + 1e-6} if X in one.row else {} for one in entries]  # a nanometre
-    lines = [replace(one, row={**one.row, **x}).to_line() for one, x in zip(entries, moved, strict=True)]
-    manifest.write_bytes(b"".join(lines))
-    answer = blocksim("verify-run", "study", "--sample", 100)
-    assert (answer.code, f"{X}: " in answer.out) == (1, True)
-
-
 def missed(_: Setting) -> list[Row]:
     return [Row("half", "m", 1.0, 0.5, 0.1), Row("whole", "m", 1.0, 1.0, 0.1)]
 
@@ -166,13 +148,3 @@ def test_misses_shortened_cases_and_a_stop_are_told(
     monkeypatch.setattr(cases, "CASES", MADE_UP[name])
     answer = blocksim("verify", *(["--quick"] if name == "quick" else []))
     golden(f"exit code {answer.code}\n{answer.out}{answer.err}", rules=["times"])
-
-
-def test_rigid_contacts_say_what_is_left_out(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    few = tuple(case for case in cases.CASES if case.id in {"V2", "V5"})
-    monkeypatch.setattr(cases, "CASES", few)
-    answer = blocksim("verify", "--scheme", "nonsmooth")
-    assert answer.code == 0
-    assert "V2" not in answer.out
-    assert "left out: V2 (rigid blocks have no stiffness" in answer.err
-    assert "1 of 1 cases inside" in answer.err
