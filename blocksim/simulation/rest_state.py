@@ -174,7 +174,7 @@ class _Settlement:
     @property
     def bodies(self) -> Any:
         """The records of the blocks."""
-        return self.scene.world.bodies[: self.count]
+        return self.scene.world.bodies.view(np.ndarray)[: self.count]
 
     @contextmanager
     def without_time(self) -> Iterator[None]:

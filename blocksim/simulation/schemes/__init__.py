@@ -176,8 +176,14 @@ SCHEMES: Mapping[str, Scheme] = _Schemes()
 
 def scheme_of(scene: AnyScene | systems.Coupled) -> Scheme:
     """Return the scheme that a scene is of."""
+    return _scheme_of_type(type(scene))
+
+
+@functools.cache
+def _scheme_of_type(scene_type: type) -> Scheme:
+    """Return it by the type: every frame asks several times."""
     schemes = (one for scheme in SCHEMES.values() for one in (scheme, scheme.with_systems) if one is not None)
-    return next(scheme for scheme in schemes if isinstance(scene, scheme.scene_type))
+    return next(scheme for scheme in schemes if issubclass(scene_type, scheme.scene_type))
 
 
 def build_scene(scenario: Scenario) -> AnyScene:

@@ -19,9 +19,9 @@ WORK_SPACE = ("points", "matrices", "before", "action")
 
 def explicit_contacts(world: arrays.World, blocks: int) -> trajectory.Rows:
     """Return all contacts in the order of pairs and slots; bodies from number `blocks` on are ground and walls."""
-    pairs = world.pairs[: int(world.clock[0].pair_count)]
+    pairs = world.pairs.view(np.ndarray)[: int(world.clock[0].pair_count)]
     pair, place = np.nonzero(np.arange(world.contacts.shape[1]) < pairs["active"][:, None])
-    contacts = world.contacts[pair, place]
+    contacts = world.contacts.view(np.ndarray)[pair, place]
     a, b = pairs["a"][pair].astype(np.intp), pairs["b"][pair].astype(np.intp)
     rows = np.zeros(len(contacts), trajectory.CONTACT_ROW)
     rows["body_a"], rows["body_b"] = a, np.where(b < blocks, b, trajectory.SUPPORT)

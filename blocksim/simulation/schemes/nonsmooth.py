@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 def nonsmooth_contacts(scene: arrays.Nonsmooth, blocks: int) -> trajectory.Rows:
     """Return all points that press, those of a manifold beside one another; bodies from `blocks` on are the support."""
     stepping = scene.contacts.stepping[0]
-    manifolds = scene.contacts.constraints[: int(stepping.constraint_count)]
+    manifolds = scene.contacts.constraints.view(np.ndarray)[: int(stepping.constraint_count)]  # fields of records: slow
     manifolds = manifolds[manifolds["reach"] != arrays.AWAY]
     points = np.stack([_points(scene, manifolds, "one", 0.0), _points(scene, manifolds, "two", 1.0)], axis=-1).ravel()
     rows = points[points["normal_force"] > 0.0]
@@ -33,7 +33,7 @@ def nonsmooth_contacts(scene: arrays.Nonsmooth, blocks: int) -> trajectory.Rows:
 def _points(scene: arrays.Nonsmooth, manifolds: Any, which: str, along: float) -> trajectory.Rows:
     """Return one point of every manifold, with impulses (N s); `along` counts widths from point one."""
     nx, ny = manifolds["nx"], manifolds["ny"]
-    body = scene.world.bodies[manifolds["a"]]
+    body = scene.world.bodies.view(np.ndarray)[manifolds["a"]]
     above, beside = manifolds["shear_arm_a"], along * manifolds["width"] - manifolds["arm_a"]
     normal, total = manifolds[f"normal_{which}"], manifolds["normal_one"] + manifolds["normal_two"]
     rows = np.zeros(len(manifolds), trajectory.CONTACT_ROW)
