@@ -174,16 +174,15 @@ class _Schemes(Mapping[str, Scheme]):
 SCHEMES: Mapping[str, Scheme] = _Schemes()
 
 
+KNOWN: dict[type, Scheme] = {}  # by types of scenes: every frame asks several times
+
+
 def scheme_of(scene: AnyScene | systems.Coupled) -> Scheme:
     """Return the scheme that a scene is of."""
-    return _scheme_of_type(type(scene))
-
-
-@functools.cache
-def _scheme_of_type(scene_type: type) -> Scheme:
-    """Return it by the type: every frame asks several times."""
-    schemes = (one for scheme in SCHEMES.values() for one in (scheme, scheme.with_systems) if one is not None)
-    return next(scheme for scheme in schemes if issubclass(scene_type, scheme.scene_type))
+    if type(scene) not in KNOWN:
+        schemes = (one for scheme in SCHEMES.values() for one in (scheme, scheme.with_systems) if one is not None)
+        KNOWN[type(scene)] = next(scheme for scheme in schemes if isinstance(scene, scheme.scene_type))
+    return KNOWN[type(scene)]
 
 
 def build_scene(scenario: Scenario) -> AnyScene:
