@@ -79,7 +79,7 @@ def test_the_table_beside_the_picture_is_what_limit_analysis_gives() -> None:
 
 
 def test_joints_of_an_arch_about_to_fall_on_a_tilting_table_press_where_statics_has_them() -> None:
-    """Seven voussoirs on springs at 0.999 of the pull under which they fall: the force is at a corner at four joints."""
+    """Seven voussoirs on springs at 0.999 of the pull under which they fall: four joints press at a corner."""
     arch, level = SCENARIOS / "tilting_arch.toml", {"time.scheme": "nonsmooth"}
     blocks = Blockwork.of(load_scenario(arch, {**level, "ground.tilt": "0 deg"}))
     found = Programme(blocks).greatest(blocks.forces, -blocks.horizontal)  # to the left
