@@ -171,6 +171,10 @@ def test_pictures_animations_and_reports_are_made_of_results(tmp_path: Path, mon
     assert blocksim.plot("kept", "h.svg", kind="history", panels=["x"]).stat().st_size > 0
     assert blocksim.animate(kept, width=200, fps=5.0).name == "slide.gif"
     assert "slide" in blocksim.report(kept).read_text(encoding="utf-8")
+    with pytest.raises(InvalidInputError, match="unknown colour 'red' in this run; choose block, material, sp"):
+        blocksim.plot(kept, colour="red", overwrite=True)
+    with pytest.raises(InvalidInputError, match="unknown method 'moris'"):
+        blocksim.sensitivity(SLIDE, method="moris")
 
 
 def test_picture_of_a_result_that_was_not_kept_says_what_to_do(slide: Result) -> None:

@@ -120,6 +120,7 @@ def test_sensitivity_convergence_and_calibration_show_their_table_and_picture(tm
         with pytest.raises(InvalidInputError, match="no motion"):
             shown.animate()
     assert repr(fitted).startswith("<Fit of slide: best of 4 trials")
+    assert set(ranked.to_frame()["key"]) == {*vary}
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in (ROOT / "scenarios/notebooks").glob("*.ipynb")))

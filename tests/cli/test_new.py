@@ -1,5 +1,6 @@
 """blocksim new: every template works as it is, and nothing is replaced."""
 
+import errno
 from pathlib import Path
 
 import pytest
@@ -65,3 +66,13 @@ def test_scenarios_that_ship_are_copied_with_their_tables(blocksim: Command) -> 
     assert load_scenario("all/record_column.toml").motion is not None
     assert load_scenario("all/three_blocks.toml").experiment is not None
     assert blocksim("new", "scenarios", "all").code == 73
+
+
+def test_a_full_disk_leaves_no_half_file(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", fail)
+    answer = blocksim("new", "stack", "mine")
+    assert (answer.code, answer.err) == (74, "mine.toml: cannot be written: No space left on device\n")
+    assert not Path("mine.toml").exists()
