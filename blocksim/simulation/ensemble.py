@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
-from blocksim.kernels.common import arrays, compiler, frame_times, systems
-from blocksim.kernels.common.members import Watched
+from blocksim.kernels.common import arrays, compiler, systems
+from blocksim.kernels.common.members import Watched, next_frame
 from blocksim.scenario import PlacedBody, Scenario, motion as motions, placement
 from blocksim.simulation import balance, instruments, loop, observables, rest_state, schemes, trajectory
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
@@ -279,12 +279,12 @@ class Ensemble:
         stops, is_under_way = np.zeros_like(self.codes), True
         while is_under_way:
             done = int(self.scenes.world.clock["steps"][m, 0])
-            frame = stop if self.watch.first[m] else min(stop, frame_times.next_frame(done, self.periods[m]))
+            frame = stop if self.watch.first[m] else min(stop, next_frame(done, self.periods[m]))
             stops[m] = frame
             self._advance_members(np.array([m]), stops, rows, self.codes)
             rows = np.zeros_like(rows)  # what is measured at the start of a later call
             is_under_way = self.codes[m] == arrays.REACHED and frame < stop
-            if self.codes[m] == arrays.REACHED and frame_times.next_frame(frame - 1, self.periods[m]) == frame:
+            if self.codes[m] == arrays.REACHED and next_frame(frame - 1, self.periods[m]) == frame:
                 motion = blocks.motion_of(self.scenes.world.bodies[[m], : len(self.placed[0])])
                 self.watch.follow([m], motion, [frame * self.time_steps[m]])
 
@@ -336,7 +336,7 @@ class Ensemble:
                 look = stop = min(balance.next_energy_check(done, self.bodies), last)
                 # frames count until something has moved, and on a support that moves until a block is removed
                 if self.supports[m].moves or not self.watch.first[m]:
-                    stop = min(stop, frame_times.next_frame(done, self.periods[m]))
+                    stop = min(stop, next_frame(done, self.periods[m]))
                 event = loop.NEVER if timeline is None else timeline.next_step(done)
                 scene, code = schemes.ALONE.advance(scene, min(stop, event))
                 if timeline is not None:
@@ -344,7 +344,7 @@ class Ensemble:
                 now = int(scene.world.clock[0].steps)
                 is_under_way = code == arrays.REACHED and now < last
                 continues = is_under_way and (now != look or balance.adds_up(balance.energy_ledger(scene, start)))
-                if not continues or frame_times.next_frame(now - 1, self.periods[m]) == now:
+                if not continues or next_frame(now - 1, self.periods[m]) == now:
                     motion = blocks.motion_of(build.stack_of_one(scene).world.bodies[[0], : len(self.placed[0])])
                     self.watch.follow([m], motion, [now * self.time_steps[m]])
         except BlocksimError as error:

@@ -278,7 +278,7 @@ class ProbeChannel:
 
     def next_step(self, done: int) -> int:
         """Return the next step to sample after `done` steps."""
-        return int(balance.solver_module("kernels.common.frame_times").next_frame(done, self.period))
+        return int(balance.solver_module("kernels.common.members").next_frame(done, self.period))
 
     def sample(self, moment: Snapshot) -> None:
         """Add a sample if one is due at this step, wherever the run ends, and it is not there yet."""
@@ -439,7 +439,7 @@ class Recorder:
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps, wherever those end."""
-        return int(balance.solver_module("kernels.common.frame_times").next_frame(done, self.steps_per_frame))
+        return int(balance.solver_module("kernels.common.members").next_frame(done, self.steps_per_frame))
 
     def count_until(self, step: int) -> int:
         """Return the number of frames up to a step."""

@@ -19,11 +19,6 @@ def fall_distance(time: float, gravity: float = GRAVITY) -> float:
     return 0.5 * gravity * time**2
 
 
-def fall_time(height: float, gravity: float = GRAVITY) -> float:
-    """Return the time (s) to fall `height` (m) from rest: sqrt(2 h/g), from Eq. 10, first form."""
-    return sqrt(2.0 * height / gravity)
-
-
 def remaining_rise(time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
     """Return (v - g t)^2/(2 g) (m), Eq. 10, second form, as printed, at `time` (s) after impact number `impacts`.
 

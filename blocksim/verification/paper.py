@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import isfinite
+from math import isfinite, sqrt
 from pathlib import Path
 from typing import NamedTuple
 
@@ -53,7 +53,7 @@ def bounce_law(result: results.Result) -> studies.LawCurve:
     frames, gravity = result.frames, result.scenario.gravity
     clearance = frames.y[:, 0] - 0.5 * frames.size_y[0]
     start, restitution = float(clearance[0]), result.scenario.contact.restitution.block_ground
-    impacts = [forms.fall_time(start, gravity)]
+    impacts = [sqrt(2.0 * start / gravity)]
     while forms.apex_height(start, restitution, len(impacts)) > LEAST_APEX:
         impacts.append(impacts[-1] + forms.flight_time(start, restitution, len(impacts), gravity))
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import ALL, BODY, MOTION_PIECE, TEAM_SIZE, zeros
-from blocksim.kernels.common.integrate import renew_rotations
+from blocksim.kernels.common.mechanics import renew_rotations
 from blocksim.kernels.common.shapes import place_corners, separation
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.models import contact_points

@@ -17,14 +17,14 @@ from blocksim.kernels.common.arrays import (
     World,
     zeros,
 )
-from blocksim.kernels.common.integrate import renew_rotations
+from blocksim.kernels.common.mechanics import renew_rotations
 from blocksim.kernels.common.neighbours import lay_cells, list_pairs, sort_into_cells, travel
 from blocksim.kernels.common.shapes import separation, turn
 from blocksim.kernels.common.tolerances import MOST_UNSEEN, SMALL_TURN
 from blocksim.kernels.explicit.broad_phase import PAIR_SHARE, carry_history, unseen_steps
 from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.explicit.persistent_forces import CHANGED, UNTOUCHED, persistent_forces
-from blocksim.kernels.sph.cells import PLACE, find_neighbours
+from blocksim.kernels.sph.fields import PLACE, find_neighbours
 from blocksim.verification.scene import Simulation, scenario_of
 from blocksim.world.build import build_world, empty_lists
 from tests.kernels.references import apart as largest_gap, distances, turning

@@ -24,8 +24,8 @@ from blocksim.kernels.common.arrays import (
     World,
 )
 from blocksim.kernels.common.barrier import barrier
-from blocksim.kernels.common.integrate import kick_and_drift
 from blocksim.kernels.common.jit import config, entry_kernel
+from blocksim.kernels.common.mechanics import kick_and_drift
 from blocksim.kernels.explicit.partition import add_from_before, partition
 from blocksim.kernels.explicit.step import advance, advance_in_team, forces_between, forces_within
 from blocksim.verification.scene import HEIGHT

@@ -19,7 +19,6 @@ from blocksim.kernels.explicit import (
     broad_phase,
     contact,
     damping,
-    depth,
     forces,
     inertia,
     kinematics,
@@ -32,8 +31,6 @@ from blocksim.kernels.explicit.models import PARTICLES, SURFACE, surface
 from blocksim.kernels.explicit.sliver_axes import Jet
 from blocksim.kernels.nonsmooth import (
     arrays,
-    cone,
-    contact_groups,
     cuts,
     faces,
     impact_rounds,
@@ -145,12 +142,12 @@ def test_dashpot_of_hertz_rises_at_the_begin_of_a_contact(steps: float, rises: b
 
 @sides(("given", "limit"), [(0.0, 0.1), (0.3, 0.3), (0.9, 0.9), (9.0, 1.0)])
 def test_overlap_has_a_limit_and_none_is_beyond_the_middle(given: float, limit: float) -> None:
-    assert depth.overlap_limit(SQUARE, SQUARE, given) == pytest.approx(limit)
+    assert broad_phase.overlap_limit(SQUARE, SQUARE, given) == pytest.approx(limit)
 
 
 def test_overlap_of_particles_is_less_than_where_centres_of_two_rows_meet_and_more_than_in_their_gaps() -> None:
     world = record(controls=[record(model=PARTICLES, particle_size=0.1)], bodies=[SQUARE, SQUARE])
-    assert 0.035 < depth.reach_of_contacts(world, record(a=0, b=1, limit=0.1)) < 0.1
+    assert 0.035 < contact.reach_of_contacts(world, record(a=0, b=1, limit=0.1)) < 0.1
 
 
 @sides(("steps", "is_coming"), [(16.0, True), (144.0, False)])
@@ -354,7 +351,7 @@ def test_impacts_are_solved_better_than_a_velocity_pass(of_pass: float, of_impac
 
 @sides(("gain", "counts"), [(3e-10, False), (3e-9, True)])
 def test_energy_that_impacts_create_counts_beyond_what_they_are_solved_to(gain: float, counts: bool) -> None:
-    assert contact_groups.has_gain(record(now=1.0 + gain, then=1.0)) == counts
+    assert impact_rounds.has_gain(record(now=1.0 + gain, then=1.0)) == counts
 
 
 @sides(("slope", "presses"), [(0.034, False), (0.3, True)])
@@ -371,8 +368,8 @@ def test_what_is_not_upright_presses_at_the_start_of_a_run(slope: float, presses
 def test_shear_that_couples_strongly_goes_a_share_of_its_way(
     monkeypatch: pytest.MonkeyPatch, factor: float, is_strong: bool
 ) -> None:
-    monkeypatch.setattr(cone, "coupling", lambda *_: factor)
-    found = cone.approached(None, None, None, 0.0, 2.0, 1.0)  # type: ignore[arg-type]
+    monkeypatch.setattr(passes, "coupling", lambda *_: factor)
+    found = passes.approached(None, None, None, 0.0, 2.0, 1.0)  # type: ignore[arg-type]
     assert (found < 1.0) == is_strong
 
 

@@ -24,8 +24,8 @@ Each part is taken by `private`, which says so where the installed numba lacks i
 | numba.core.registry cpu_target | processor and features that machine code is made for |
 | numba.core.serialize dumps | compiled functions as bytes (jit.py) |
 | numba.np.linalg, numba.np.arraymath ensure_blas | not called as array functions are imported: it takes scipy.linalg |
-| numba.core.cgutils | tuples and declarations in generated code (simd/code.py) |
-| numba.core.typing.templates AbstractTemplate, infer_global, signature | types of functions of lanes (simd/code.py) |
+| numba.core.cgutils | tuples and declarations in generated code (simd.py) |
+| numba.core.typing.templates AbstractTemplate, infer_global, signature | types of functions of lanes (simd.py) |
 | numba.core.event install_timer | shortcut: no timer for every level of calls |
 | numba.core.funcdesc default_mangler | shortcut: short names of functions |
 | numba.core.itanium_mangler mangle | the short names themselves |
@@ -34,7 +34,7 @@ Each part is taken by `private`, which says so where the installed numba lacks i
 | numba.core.base BaseContext | shortcut: sizes of structures, each once |
 | numba.core.targetconfig TargetConfig, ConfigStack | shortcut: sets of options compared by their values |
 | llvmlite.binding | LLVM code read back; shortcut: triple and name of the processor, each once |
-| llvmlite.ir | instructions of lanes and barriers (simd/code.py, barrier.py) |
+| llvmlite.ir | instructions of lanes and barriers (simd.py, barrier.py) |
 """
 
 import contextlib

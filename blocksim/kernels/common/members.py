@@ -1,13 +1,13 @@
 """Members of ensembles: one world out of many copies of a scene, and what is seen of it while it advances.
 
 Members record no frames. Compiled code keeps the first step at which a block has moved and the places then; which
-block was first is decided by blocksim.simulation.movement, as for a run with frames.
+block was first is decided by blocksim.simulation.observables, as for a run with frames.
 """
 
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.common import arrays, frame_times, jit
+from blocksim.kernels.common import arrays, jit
 
 
 @jit.kernel
@@ -63,7 +63,18 @@ class Watched(NamedTuple):
     peaks: arrays.Floats  # (m,) output: rad, the largest rotation of a block that can move
 
 
-step_of_next = jit.rare_kernel(frame_times.next_frame)
+def next_frame(done: int, period: float) -> int:
+    """Return the next step with a frame after `done` steps, given the steps (not rounded) between two frames.
+
+    Plain Python, as it is asked outside of compiled code too.
+    """
+    number = int(done / period)
+    while round(number * period) <= done:
+        number += 1
+    return round(number * period)
+
+
+step_of_next = jit.rare_kernel(next_frame)
 
 
 @jit.rare_kernel

@@ -25,9 +25,9 @@ def is_driven(one: arrays.Record) -> bool:
 
 
 @jit.rare_kernel
-def piece_at(motion: arrays.Records, piece: int, time: float) -> int:
-    """Return the piece that holds at a time (s), sought from `piece` on."""
-    while piece + 1 < motion.size and motion[piece + 1].start <= time:
+def piece_at(motion: arrays.Records, piece: int, end: int, time: float) -> int:
+    """Return the piece of a path that holds at a time (s), sought from `piece` to before `end`."""
+    while piece + 1 < end and motion[piece + 1].start <= time:
         piece += 1
     return piece
 
@@ -63,9 +63,9 @@ def move_support(world: arrays.World, step: float) -> None:
     clock = world.clock[0]
     before = clock.steps * controls.step
     now = before + step
-    last = displacement(world.motion[piece_at(world.motion, clock.motion_piece, before)], before)
-    clock.motion_piece = piece_at(world.motion, clock.motion_piece, before)
-    piece = world.motion[piece_at(world.motion, clock.motion_piece, now)]
+    clock.motion_piece = piece_at(world.motion, clock.motion_piece, world.motion.size, before)
+    last = displacement(world.motion[clock.motion_piece], before)
+    piece = world.motion[piece_at(world.motion, clock.motion_piece, world.motion.size, now)]
     moved = displacement(piece, now)
     speed = (moved - last) / step if step > 0.0 else rate(piece, now)
     change = acceleration(piece, now)
@@ -79,27 +79,6 @@ def move_support(world: arrays.World, step: float) -> None:
         body.vy = controls.motion_y * speed
         body.ax = controls.motion_x * change
         body.ay = controls.motion_y * change
-
-
-@jit.rare_kernel
-def tally_support(world: arrays.World, step: float) -> None:
-    """Tally the work that contacts have done on the support over the last drift, by the trapezoid rule as all work.
-
-    Clears the totals.
-    """
-    total = 0.0
-    for before in world.moved:
-        if is_driven(before):
-            break
-        body = world.bodies[before.body]
-        total += (before.fx + body.fx) * body.vx + (before.fy + body.fy) * body.vy
-        before.fx = body.fx
-        before.fy = body.fy
-        body.fx = 0.0
-        body.fy = 0.0
-        body.torque = 0.0
-        body.pairs_now = 0
-    world.ledger[0].to_support += 0.5 * step * total
 
 
 @jit.rare_kernel
@@ -123,18 +102,10 @@ class Pose(NamedTuple):
 
 
 @jit.rare_kernel
-def path_piece(motion: arrays.Records, piece: int, end: int, time: float) -> int:
-    """Return the piece of one path that holds at a time (s), sought from `piece` to before `end`."""
-    while piece + 1 < end and motion[piece + 1].start <= time:
-        piece += 1
-    return piece
-
-
-@jit.rare_kernel
 def pieces_at(world: arrays.World, one: arrays.Record, time: float) -> tuple[arrays.Record, arrays.Record]:
     """Return the pieces of shift and turn of a driven body that hold at a time (s) not before the current step."""
-    shift = path_piece(world.motion, one.shift, one.shift_end, time)
-    return world.motion[shift], world.motion[path_piece(world.motion, one.turn, one.turn_end, time)]
+    shift = piece_at(world.motion, one.shift, one.shift_end, time)
+    return world.motion[shift], world.motion[piece_at(world.motion, one.turn, one.turn_end, time)]
 
 
 @jit.rare_kernel
@@ -173,8 +144,8 @@ def put(body: arrays.Record, pose: Pose) -> None:
 @jit.rare_kernel
 def follow_pieces(world: arrays.World, one: arrays.Record, time: float) -> None:
     """Have pieces of a driven body sought from those on that hold at a time (s)."""
-    one.shift = path_piece(world.motion, one.shift, one.shift_end, time)
-    one.turn = path_piece(world.motion, one.turn, one.turn_end, time)
+    one.shift = piece_at(world.motion, one.shift, one.shift_end, time)
+    one.turn = piece_at(world.motion, one.turn, one.turn_end, time)
 
 
 @jit.rare_kernel
@@ -226,14 +197,14 @@ def note_accelerations(world: arrays.World, one: arrays.Record, body: arrays.Rec
 
 
 @jit.rare_kernel
-def tally_driven(world: arrays.World, step: float) -> None:
-    """Tally the work that contacts have done on driven bodies over the last drift, as tally_support does.
+def tally_moved(world: arrays.World, step: float, driven: bool) -> None:
+    """Tally the work that contacts have done over the last drift on driven bodies, or on all others that move.
 
-    Clears the totals.
+    By the trapezoid rule as all work. Clears the totals.
     """
     total = 0.0
     for before in world.moved:
-        if not is_driven(before):
+        if is_driven(before) != driven:
             continue
         body = world.bodies[before.body]
         total += (before.fx + body.fx) * body.vx + (before.fy + body.fy) * body.vy

@@ -7,7 +7,6 @@ come since it was made is looked at again before any can have come too far.
 import math
 
 from blocksim.kernels.common import arrays, jit, neighbours, supports, tolerances
-from blocksim.kernels.explicit.depth import overlap_limit
 from blocksim.kernels.explicit.models import near_slots
 
 MOST_SLOTS = 32  # of corners of a pair
@@ -42,6 +41,13 @@ def move_pair(world: arrays.World, source: int, target: int) -> None:
     if world.pairs[source].active > 0:
         world.operators[target, arrays.NORMAL] = world.operators[source, arrays.NORMAL]
         world.operators[target, arrays.SHEAR] = world.operators[source, arrays.SHEAR]
+
+
+@jit.rare_kernel
+def overlap_limit(a: arrays.Record, b: arrays.Record, given: float) -> float:
+    """Return how far (m) two bodies may overlap; `given` (m) is zero where nothing was asked for."""
+    side = min(a.least_width, b.least_width)
+    return min(given, tolerances.MIDDLE * side) if given > 0.0 else tolerances.OVERLAP_SHARE * side
 
 
 @jit.rare_kernel

@@ -2,14 +2,20 @@
 
 Here any number of points, in whatever way they were found; persistent_forces.py has the pairs whose one or two contacts
 continue as they were, which is what nearly all pairs do at nearly all steps.
+
+A contact pushes a corner out through the nearest face that it can touch. Beyond the middle of a thin body, or deeper
+than the particles of a boundary reach, that would be the wrong way or none at all, and a block would come out on the
+other side. So a run ends at the first overlap beyond a limit, that of the thinner of the two. While a pair touches, the
+overlaps of its contacts are checked; where it does not, or particles may have lost one another, the overlap of the
+shapes. No step takes a block far into another (world/step.py, broad_phase.py), so none is behind before it is found.
 """
 
-from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, World
+from blocksim.kernels.common import tolerances
+from blocksim.kernels.common.arrays import ALL, NORMAL, SHEAR, Record, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.tolerances import IMPACT_STEPS
-from blocksim.kernels.explicit import bearing, damping, depth, history, kinematics, sides, slivers
+from blocksim.kernels.explicit import bearing, damping, history, kinematics, sides, slivers
 from blocksim.kernels.explicit.forces import NOTHING, Touch, forces_of, forces_of_many
-from blocksim.kernels.explicit.models import SURFACE, contact_points
+from blocksim.kernels.explicit.models import KERNEL, SURFACE, contact_points
 from blocksim.kernels.explicit.partition import keep
 
 
@@ -23,7 +29,7 @@ def spare_lost_faces(world: World, p: int, count: int) -> None:
     """
     for i in range(count):
         point = world.points[i]
-        if point.beside < IMPACT_STEPS * abs(point.closing):
+        if point.beside < tolerances.IMPACT_STEPS * abs(point.closing):
             point.weight = 0.0
             damping.renew_dashpots(world.pairs[p])
 
@@ -70,11 +76,45 @@ def resolve_points(world: World, p: int, count: int, step: float, tally: Record)
         if i < pair.active:
             contact = world.contacts[p, i]
             continuing += 1 if contact.slot == point.slot and contact.face == point.face else 0
-        loses_face = loses_face or point.beside < IMPACT_STEPS * abs(point.closing)
+        loses_face = loses_face or point.beside < tolerances.IMPACT_STEPS * abs(point.closing)
     if continuing != count or count != pair.active:
         history.change_contacts(world, p, count, step, tally)
     if loses_face:
         spare_lost_faces(world, p, count)
+
+
+@rare_kernel
+def penetration(world: World, pair: Record) -> float:
+    """Return how deep (m) the bodies of a pair overlap; what lies behind a piece of ground does not overlap it."""
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    is_ground = pair.b == world.bodies.size - 1
+    if not is_ground and b.faces < ALL and b.cos * (a.y - b.y) - b.sin * (a.x - b.x) < b.half_y:
+        return 0.0
+    return -sides.widest_gap(a, b, is_ground, world.corners)[1]
+
+
+@rare_kernel
+def reach_of_contacts(world: World, pair: Record) -> float:
+    """Return at which overlap (m) of the rectangles contacts may be lost, or act the wrong way."""
+    controls = world.controls[0]
+    if controls.model == SURFACE:
+        return pair.limit
+    reach = controls.support if controls.model == KERNEL else tolerances.ROWS_APART * controls.particle_size
+    side = min(world.bodies[pair.a].least_width, world.bodies[pair.b].least_width)
+    return min(reach, tolerances.MIDDLE * side)
+
+
+@rare_kernel
+def is_too_deep(world: World, p: int, count: int) -> bool:
+    """Return True if pair p, whose `count` points have been found, overlaps too far."""
+    pair = world.pairs[p]
+    for i in range(count):
+        if world.points[i].depth > pair.limit:
+            return True
+    if count > 0 and world.controls[0].model == SURFACE:
+        return False
+    return penetration(world, pair) > reach_of_contacts(world, pair)
 
 
 @rare_kernel
@@ -98,7 +138,7 @@ def pair_forces(world: World, p: int, step: float) -> None:
     count = contact_points(world, p)
     if sides.has_polygons(world.corners):
         count = slivers.points_of_sliver(world, p, count)
-    action.is_too_deep = depth.is_too_deep(world, p, count)
+    action.is_too_deep = is_too_deep(world, p, count)
     model = world.controls[0].model
     action.asks = count != pair.active and model == SURFACE
     before = pair.stiffness

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from blocksim.kernels.common.arrays import NORMAL, SHEAR, Corners, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.tolerances import OPERATOR_LIFE, STEADY, STEADY_STEPS
-from blocksim.kernels.explicit import bearing, damping, friction, history, inertia, kinematics, laws
+from blocksim.kernels.explicit import bearing, damping, history, inertia, kinematics, laws
 
 
 class Effect(NamedTuple):
@@ -74,7 +74,7 @@ def grip_of(
     """
     normal = max(force, 0.0)
     stiffness, last = values.shear_ratio * spring.slope, values.shear_ratio * old.slope
-    drawn, limit, slides, rubbed = friction.draw_lasting_spring(
+    drawn, limit, slides, rubbed = laws.draw_lasting_spring(
         values, stiffness, last, contact.spring, point.slip, point.drawn, normal, point.slip_rate, lasts
     )
     return Grip(normal, drawn, stiffness, last, stiffness * drawn, limit, slides, rubbed)
@@ -88,7 +88,7 @@ def shear_of(point: kinematics.Point, values: Record, grip: Grip, force: float) 
     """
     if grip.slides:
         return grip.elastic
-    return friction.clip_to_cone(values, force, grip.limit, grip.normal, point.slip_rate)
+    return laws.clip_to_cone(values, force, grip.limit, grip.normal, point.slip_rate)
 
 
 @kernel

@@ -1,17 +1,16 @@
 """The time loop between two outputs, in one compiled call for every thread.
 
-Forces of all pairs of one thread's share; its bodies continue as soon as the last of their pairs is done.
+Forces of all pairs of one thread's share; its bodies continue as soon as the last of their pairs is done. Losses are
+tallied where forces are added up (also in history.py); `measure` writes what the scene holds now.
 """
 
 import math
 
-from blocksim.kernels.common import arrays, integrate, jit, loads, supports
+from blocksim.kernels.common import arrays, jit, loads, mechanics, supports
 from blocksim.kernels.common.barrier import barrier
-from blocksim.kernels.common.energy import weights_power
 from blocksim.kernels.common.members import Watched, frame_to_watch, member, watch
 from blocksim.kernels.common.systems import Coupled, Systems, step_systems, survey_systems
-from blocksim.kernels.explicit import broad_phase, contact, inertia
-from blocksim.kernels.explicit.energy import measure
+from blocksim.kernels.explicit import broad_phase, contact, history, inertia, laws
 from blocksim.kernels.explicit.partition import add_from_before, add_kept, add_to_first, add_to_second, keep, partition
 from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, persistent_forces
 
@@ -49,10 +48,10 @@ def changed_forces(world: arrays.World, p: int, step: float, tally: arrays.Recor
 def move_group(world: arrays.World, first: int, end: int, step: float, goes_on: bool) -> None:
     """Kick the bodies from `first` to before `end` by their new forces, then into the next step if the run goes on."""
     for i in range(first, end):
-        integrate.accelerate_and_kick(world.bodies[i], world.controls[0], step)
+        mechanics.accelerate_and_kick(world.bodies[i], world.controls[0], step)
         if goes_on:
-            integrate.kick(world.bodies[i], step)
-            integrate.drift(world.bodies[i], step)
+            mechanics.kick(world.bodies[i], step)
+            mechanics.drift(world.bodies[i], step)
 
 
 @jit.kernel
@@ -105,6 +104,75 @@ def forces_within(world: arrays.World, share: arrays.Record, step: float, goes_o
         first = end
 
 
+LEDGER_ROW = (
+    "kinetic",
+    "potential",
+    "stored_normal",
+    "stored_shear",
+    "dashpot",
+    "friction",
+    "broken",
+    "to_support",
+    "to_loads",
+    "events",
+)
+
+
+@jit.rare_kernel
+def contact_summary(world: arrays.World) -> tuple[float, float, int, float]:
+    """Return energy stored in normal and in shear springs (J), number of contacts, largest overlap (m)."""
+    normal = 0.0
+    shear = 0.0
+    count = 0
+    largest = 0.0
+    exponent = world.controls[0].exponent
+    for p in range(world.clock[0].pair_count):
+        pair = world.pairs[p]
+        if pair.active > 0:
+            values = world.interactions[world.bodies[pair.a].contact_class, world.bodies[pair.b].contact_class]
+            for k in range(pair.active):
+                one = world.contacts[p, k]
+                of_spring = history.stiffness_before(one, pair.stiffness, values, world.particles)
+                stiffness = history.shear_stiffness_before(one, of_spring, values, exponent)
+                normal += laws.stored_energy(exponent, of_spring, one.depth)
+                shear += 0.5 * stiffness * one.spring * one.spring
+                count += 1
+                largest = max(largest, one.depth)
+    return normal, shear, count, largest
+
+
+@jit.rare_kernel
+def tallied(ledger: arrays.Records) -> tuple[float, float, float]:
+    """Return the losses (J) to dashpots, friction and broken contacts, summed over all groups of pairs in order."""
+    dashpot = 0.0
+    friction = 0.0
+    broken = 0.0
+    for tally in ledger:
+        dashpot += tally.dashpot
+        friction += tally.friction
+        broken += tally.broken
+    return dashpot, friction, broken
+
+
+@jit.entry_kernel
+def measure(world: arrays.World, row: arrays.Floats) -> None:
+    """Write one row of the ledger: energies (J) as in `LEDGER_ROW`, number of contacts, largest overlap (m)."""
+    ledger = world.ledger[0]
+    normal, shear, count, largest = contact_summary(world)
+    row[0] = mechanics.kinetic_energy(world)
+    row[1] = mechanics.potential_energy(world)
+    row[2] = normal
+    row[3] = shear
+    row[4], row[5], row[6] = tallied(world.ledger)
+    row[7] = ledger.to_support
+    row[8] = 0.0
+    for tally in world.ledger:
+        row[8] += tally.to_loads
+    row[9] = ledger.events
+    row[10] = count
+    row[11] = largest
+
+
 NEIGHBOURS, CHECK, MOVE, TALLY, SHARE_OUT = range(5)  # what one thread does for all
 
 
@@ -125,10 +193,10 @@ def check(world: arrays.World, systems: Systems | None) -> int:
     controls = world.controls[0]
     clock = world.clock[0]
     ledger = world.ledger[0]
-    integrate.renew_rotations(world.bodies)
-    fastest = integrate.fastest_point(world.bodies)
-    kinetic = integrate.kinetic_energy(world)
-    power = weights_power(world)
+    mechanics.renew_rotations(world.bodies)
+    fastest = mechanics.fastest_point(world.bodies)
+    kinetic = mechanics.kinetic_energy(world)
+    power = mechanics.weights_power(world)
     if systems is not None:
         speed, energy, work = survey_systems(systems, world)
         fastest = max(fastest, speed)
@@ -176,8 +244,8 @@ def supervise(world: arrays.World, k: int, task: int, step: float, systems: Syst
         elif task == SHARE_OUT:
             inertia.share_out(world)
         else:
-            supports.tally_support(world, step)
-            supports.tally_driven(world, step)
+            supports.tally_moved(world, step, False)
+            supports.tally_moved(world, step, True)
     barrier(world.team)
     return world.team[arrays.STATUS]
 
@@ -213,7 +281,7 @@ def open_call(world: arrays.World, k: int, last_step: int) -> None:
     clock = world.clock[0]
     if k == 0:
         if clock.is_started == 0:
-            integrate.place_all_corners(world.bodies)
+            mechanics.place_all_corners(world.bodies)
         partition(world, world.team[arrays.TEAM_SIZE])
     barrier(world.team)
     every = world.controls[0].check_every
@@ -247,7 +315,7 @@ def begin_steps(world: arrays.World, k: int, step: float) -> bool:
         share.status = supervise(world, k, NEIGHBOURS, step, None)
         if share.status != arrays.REACHED:
             return False
-    integrate.kick_and_drift(world.bodies, share.first_body, share.last_body, step)
+    mechanics.kick_and_drift(world.bodies, share.first_body, share.last_body, step)
     if world.loads.size > 0:
         loads.push_bodies(world, share.first_body, share.last_body, share.steps * world.controls[0].step + step, step)
     if supports.has_motion(world.controls[0]):

@@ -9,7 +9,7 @@ that steps are 0.1 to 1 ms long. A step of length dt is, in the order of step.py
     cut        does an impact come first? then a shorter interval, where that may be        cuts.py
     pack       constraints that are near, four in the lanes of registers                    packs.py
     substeps   each of length h: kick, warm start, position pass, drift, velocity pass      motion.py, passes.py
-               the shear impulse within the cone of friction                                cone.py
+               the shear impulse within the cone of friction                                passes.py
                impacts that follow from one another                                         impacts.py
     finish     impulses back to the constraints, poses and velocities to the bodies; check  motion.py, energy.py
 
@@ -33,7 +33,7 @@ bodies, but is gone after the velocity pass.
 
 Impacts that follow from one another go in rounds instead (in crowds only where restitution is high; see
 world/nonsmooth.py), and create no energy:
-impacts.py, contact_groups.py, impact_rounds.py.
+impacts.py, impact_rounds.py.
 
 Where few blocks rebound (two at all, up to twelve above 0.5), and of a single one, steps are cut at impacts: cuts.py.
 

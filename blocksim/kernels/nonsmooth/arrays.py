@@ -56,7 +56,7 @@ PACK = np.dtype(
     {
         "names": [*LANE_INDICES.split(), "count", "are_simple", "is_coupled", *LANES_AT, *SINGLE_FLOATS],
         "formats": [(np.uint32, (WIDTH,))] * 3
-        # number of constraints, the others are copies; flags: static friction is the kinetic one; see cone.py
+        # number of constraints, the others are copies; flags: static friction is the kinetic one; see passes.py
         + [np.uint8] * 3
         + [(np.float64, (WIDTH,))] * len(LANES_AT)
         + [np.float64] * len(SINGLE_FLOATS),

@@ -12,7 +12,7 @@ from (J + m h (g + a)) times that mean, the change of K(v). So their work needs 
 
 import math
 
-from blocksim.kernels.common import arrays, energy, integrate, jit, loads, supports
+from blocksim.kernels.common import arrays, jit, loads, mechanics, supports
 from blocksim.kernels.common.tolerances import MIDDLE
 from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING, Nonsmooth
 from blocksim.kernels.nonsmooth.cuts import is_start
@@ -109,11 +109,11 @@ def check(scene: Nonsmooth) -> int:
     world = scene.world
     controls = world.controls[0]
     clock = world.clock[0]
-    integrate.renew_angles(world.bodies)
+    mechanics.renew_angles(world.bodies)
     ledger = world.ledger[0]
-    ledger.travel_work += controls.check_every * controls.step * energy.weights_power(world)
-    ledger.largest_kinetic = max(ledger.largest_kinetic, integrate.kinetic_energy(world))
-    fastest = integrate.fastest_point(world.bodies)
+    ledger.travel_work += controls.check_every * controls.step * mechanics.weights_power(world)
+    ledger.largest_kinetic = max(ledger.largest_kinetic, mechanics.kinetic_energy(world))
+    fastest = mechanics.fastest_point(world.bodies)
     if math.isinf(fastest):
         return arrays.NOT_FINITE
     if has_excessive_overlap(scene):
@@ -147,8 +147,8 @@ def is_supported(scene: Nonsmooth) -> bool:
 @jit.entry_kernel
 def measure_nonsmooth(scene: Nonsmooth, row: arrays.Floats) -> None:
     """Write one row of the ledger: energies (J) as in `NONSMOOTH_LEDGER`, contacts, largest overlap (m)."""
-    row[0] = integrate.kinetic_energy(scene.world)
-    row[1] = energy.potential_energy(scene.world)
+    row[0] = mechanics.kinetic_energy(scene.world)
+    row[1] = mechanics.potential_energy(scene.world)
     row[2] = row[3] = row[5] = 0.0
     for tally in scene.contacts.tallies:
         row[2] += tally.impacts

@@ -52,7 +52,7 @@ from blocksim.kernels.common.tolerances import (
     MOST_TRIES,
     TOLERANCE_SHARE,
 )
-from blocksim.kernels.nonsmooth import arrays, contact_groups, impact_rounds, motion, passes
+from blocksim.kernels.nonsmooth import arrays, impact_rounds, motion, passes
 from blocksim.kernels.nonsmooth.arrays import HIGH, LOW, NEITHER
 
 
@@ -62,7 +62,7 @@ def begin_search(contacts: arrays.Contacts) -> None:
     bodies = contacts.impacts
     for body in bodies:
         root = bodies[body.root]
-        body.is_open = 1 if contact_groups.has_gain(root) else 0
+        body.is_open = 1 if impact_rounds.has_gain(root) else 0
         body.share = 0.0 if body.is_open else 1.0
         body.side = NEITHER
         body.low = 0.0
@@ -80,7 +80,7 @@ def aim_share(contacts: arrays.Contacts, begin: int, end: int) -> None:
             pack = contacts.packs[m]
             impact_rounds.clear(pack)
             for lane in range(WIDTH):
-                body = contact_groups.of_constraint(contacts, pack, min(lane, pack.count - 1))
+                body = impact_rounds.of_constraint(contacts, pack, min(lane, pack.count - 1))
                 pack.target_one[lane] = target_of(lanes.all_one[lane], body)
                 pack.target_two[lane] = target_of(lanes.all_two[lane], body)
 
@@ -107,9 +107,9 @@ def judge(contacts: arrays.Contacts, is_last: bool) -> bool:
             body.now = 0.0
     for i in range(bodies.size):
         if bodies[i].is_open and states[i].inverse_mass > 0.0:
-            energy = contact_groups.energy(contacts, states[i], states[i].vx, states[i].vy, states[i].spin)
+            energy = impact_rounds.energy(contacts, states[i], states[i].vx, states[i].vy, states[i].spin)
             bodies[bodies[i].root].now += energy
-    contact_groups.count_work(contacts)
+    impact_rounds.count_work(contacts)
     for i in range(bodies.size):
         root = bodies[i]
         if root.root != i:
@@ -156,7 +156,7 @@ def find_between(contacts: arrays.Contacts) -> None:
             vx = state.vx - (body.after_vx if is_low else body.low_vx) + ux
             vy = state.vy - (body.after_vy if is_low else body.low_vy) + uy
             spin = state.spin - (body.after_spin if is_low else body.low_spin)
-            root.between += contact_groups.energy(contacts, state, vx, vy, spin)
+            root.between += impact_rounds.energy(contacts, state, vx, vy, spin)
 
 
 @rare_kernel
@@ -196,7 +196,7 @@ def keep_solution(contacts: arrays.Contacts, bodies: tuple[int, int], packs: tup
         if lanes.is_hit:
             pack = contacts.packs[m]
             for lane in range(WIDTH):
-                side = contact_groups.of_constraint(contacts, pack, min(lane, pack.count - 1)).side
+                side = impact_rounds.of_constraint(contacts, pack, min(lane, pack.count - 1)).side
                 if side == LOW:
                     lanes.low_one[lane] = pack.normal_one[lane]
                     lanes.low_two[lane] = pack.normal_two[lane]
@@ -224,7 +224,7 @@ def settle(contacts: arrays.Contacts, bodies: tuple[int, int], packs: tuple[int,
         if lanes.is_hit:
             pack = contacts.packs[m]
             for lane in range(WIDTH):
-                s = contact_groups.of_constraint(contacts, pack, min(lane, pack.count - 1)).share
+                s = impact_rounds.of_constraint(contacts, pack, min(lane, pack.count - 1)).share
                 pack.normal_one[lane] = between(lanes.low_one[lane], lanes.after_one[lane], s)
                 pack.normal_two[lane] = between(lanes.low_two[lane], lanes.after_two[lane], s)
                 pack.shear[lane] = between(lanes.low_shear[lane], lanes.after_shear[lane], s)
@@ -287,7 +287,7 @@ def solve_round(
     passes.velocity_pass(contacts, team, k, passes.VELOCITY, tolerance_of(stepping))
     barrier(team)
     if k == 0:
-        stepping.has_gain = contact_groups.weigh(contacts)
+        stepping.has_gain = impact_rounds.weigh(contacts)
     barrier(team)
     if not stepping.has_gain:
         return
@@ -323,7 +323,7 @@ def follow_impacts(
     stepping = contacts.stepping[0]
     packs = passes.range_of_thread(0, stepping.pack_count, k, team[TEAM_SIZE])
     if k == 0:
-        contact_groups.find_contact_groups(contacts)
+        impact_rounds.find_contact_groups(contacts)
     barrier(team)
     rewind(contacts, bodies[0], bodies[1])
     impact_rounds.begin_rounds(contacts, packs[0], packs[1])

@@ -254,7 +254,9 @@ def tally_loads(scene: arrays.Nonsmooth, first: int, last: int, share: float) ->
 @jit.rare_kernel
 def displacement_at(world: World, time: float) -> float:
     """Return the displacement (m) of the supports at a time (s) that is not before the current step."""
-    return supports.displacement(world.motion[supports.piece_at(world.motion, world.clock[0].motion_piece, time)], time)
+    return supports.displacement(
+        world.motion[supports.piece_at(world.motion, world.clock[0].motion_piece, world.motion.size, time)], time
+    )
 
 
 @jit.rare_kernel
@@ -288,7 +290,7 @@ def place_supports(scene: arrays.Nonsmooth) -> None:
     controls = world.controls[0]
     clock = world.clock[0]
     now = cuts.end_of_interval(scene)
-    clock.motion_piece = supports.piece_at(world.motion, clock.motion_piece, now)
+    clock.motion_piece = supports.piece_at(world.motion, clock.motion_piece, world.motion.size, now)
     moved = supports.displacement(world.motion[clock.motion_piece], now)
     stepping = scene.contacts.stepping[0]
     stepping.support_x = controls.motion_x * moved

@@ -4,7 +4,7 @@ Threads go through the same stages, each with its own bodies and constraints; th
 same for all is done by the first one between two of them.
 """
 
-from blocksim.kernels.common import integrate, jit, supports
+from blocksim.kernels.common import jit, mechanics, supports
 from blocksim.kernels.common.arrays import PAIRS_FULL, REACHED, STATUS, TEAM_SIZE, Floats, Integers, Records
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.members import Watched, frame_to_watch, member as world_of, of_member, watch
@@ -183,7 +183,7 @@ def advance_thread(scene: arrays.Nonsmooth, last_step: int, k: int) -> int:
     """Be thread k of those that step a world until `last_step`, or until something ends the run."""
     if k == 0 and scene.world.clock[0].is_started == 0:
         motion.load_states(scene)
-        integrate.renew_angles(scene.world.bodies)
+        mechanics.renew_angles(scene.world.bodies)
         scene.world.clock[0].is_started = 1
     barrier(scene.world.team)
     status = REACHED

@@ -81,7 +81,7 @@ ENERGIES = (
     "settling",  # lost to damping at the start
     "ramp",  # what the missing part of gravity would have done meanwhile
 )
-"""J, as `energy.measure` writes them; the last six are losses."""
+"""J, as `step.measure` writes them; the last six are losses."""
 
 
 class Soils(NamedTuple):

@@ -18,7 +18,7 @@ import math
 from blocksim.kernels.common import arrays, jit, neighbours, supports, systems, tolerances
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.explicit import sides
-from blocksim.kernels.explicit.friction import clip_to_cone, draw_same_spring
+from blocksim.kernels.explicit.laws import clip_to_cone, draw_same_spring
 from blocksim.kernels.soil.arrays import GROUP, Soils
 from blocksim.kernels.soil.neighbours import grid_of
 

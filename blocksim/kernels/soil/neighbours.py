@@ -115,7 +115,7 @@ def list_of(soils: Soils, grid: neighbours.CellGrid, c: int, near: arrays.Intege
 def list_neighbours(soils: Soils, first: int, last: int) -> None:
     """Write the lists of the groups from `first` to before `last`.
 
-    A group with more neighbours than there is room for ends the run, see energy.survey.
+    A group with more neighbours than there is room for ends the run, see step.survey.
     """
     grid = grid_of(soils)
     for g in range(first, last):

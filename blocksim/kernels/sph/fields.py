@@ -20,7 +20,8 @@ array([-9810., -9810., -9810.])
 Sums over neighbouring particles: interpolation (Eq 1) and gradients (Eq 2), plain, symmetric and corrected.
 
 V_b = m_b/rho_b is the area of particle b, W_ab = W(|r_a - r_b|, h), and grad_a W_ab = W' (r_a - r_b)/|r_a - r_b|.
-Neighbours are those of `cells.find_neighbours` with the support radius; the particle itself may be among them.
+Neighbours are those of `find_neighbours` with the support radius; the particle itself may be among them. A pair counts
+if dx^2 + dy^2 < radius^2 as computed; then |x_b - x| < radius, also exactly.
 
 Order of the error of a smooth field in h at a fixed h/dx, as tests/kernels/sph/test_convergence.py measures it:
 
@@ -45,16 +46,74 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blocksim.kernels.common.arrays import Floats, Integers
+from blocksim.kernels.common import neighbours
+from blocksim.kernels.common.arrays import Floats, Integers, Records, record_type
 from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.common.tolerances import GRADIENT_RANK, LARGEST
-from blocksim.kernels.sph import cells, functions
+from blocksim.kernels.sph import functions
 
 PLAIN = 0
 SHEPARD, LINEAR = 1, 2
 SYMMETRIC, DIFFERENCE, CORRECTED = 1, 2, 3
 INTERPOLATION_CODES = {"plain": PLAIN, "shepard": SHEPARD, "linear": LINEAR}
 GRADIENT_CODES = {"plain": PLAIN, "symmetric": SYMMETRIC, "difference": DIFFERENCE, "corrected": CORRECTED}
+PLACE = record_type("x y")  # m
+
+
+class Neighbours(NamedTuple):
+    """Neighbours by point: those of point i are indices[offsets[i]:offsets[i + 1]], cell by cell."""
+
+    offsets: Integers  # (m + 1,)
+    indices: Integers  # (offsets[m],)
+
+
+@entry_kernel
+def list_neighbours(
+    places: Records,
+    points: Floats,
+    radius: float,
+    starts: Integers,
+    order: Integers,
+    offsets: Integers,
+    indices: Integers,
+) -> None:
+    """Write the neighbours of all points, as far as there is room, and the offsets that they need."""
+    grid = neighbours.lay_cells(places, radius, places.size, False)
+    neighbours.sort_into_cells(places, grid, starts, order)
+    count = 0
+    for i in range(points.shape[0]):
+        offsets[i] = count
+        x, y = points[i, 0], points[i, 1]
+        first, last = neighbours.column_of(grid, x - radius), neighbours.column_of(grid, x + radius)
+        for row in range(neighbours.row_of(grid, y - radius), neighbours.row_of(grid, y + radius) + 1):
+            for k in range(starts[row * grid.columns + first], starts[row * grid.columns + last + 1]):
+                dx = places[order[k]].x - x
+                dy = places[order[k]].y - y
+                if dx * dx + dy * dy < radius * radius:
+                    if count < indices.size:
+                        indices[count] = order[k]
+                    count += 1
+    offsets[points.shape[0]] = count
+
+
+def find_neighbours(positions: Floats, points: Floats, radius: float) -> Neighbours:
+    """Return, for each of the points (m, 2), the particles (n, 2) nearer than `radius`; all in metres and finite.
+
+    A particle that is a point itself is listed as its own neighbour. Raises ValueError for a coordinate that is not
+    finite, for no particles and for a radius that is not positive.
+    """
+    if not (np.isfinite(positions).all() and np.isfinite(points).all()):
+        raise ValueError("positions and points must be finite")
+    if positions.shape[0] == 0 or not 0.0 < radius < math.inf:
+        raise ValueError("a neighbour search needs at least one particle and a radius above zero")
+    n = positions.shape[0]
+    places = np.ascontiguousarray(positions, np.float64).view(PLACE)[:, 0].view(np.recarray)
+    starts, order, offsets = (np.empty(size, np.int64) for size in (3 * n + 3, n, points.shape[0] + 1))
+    found = Neighbours(offsets, np.empty(0, np.int64))
+    list_neighbours(places, points, radius, starts, order, *found)
+    found = Neighbours(offsets, np.empty(offsets[-1], np.int64))
+    list_neighbours(places, points, radius, starts, order, *found)
+    return found
 
 
 class Sources(NamedTuple):
@@ -290,13 +349,13 @@ class Particles:
         return functions.support_radius(self.sources.function, self.sources.smoothing_length)
 
     @cached_property
-    def neighbours(self) -> cells.Neighbours:
+    def neighbours(self) -> Neighbours:
         """Neighbours of every particle within its support, itself among them."""
         return self.neighbours_of(self.sources.positions)
 
-    def neighbours_of(self, points: Floats) -> cells.Neighbours:
+    def neighbours_of(self, points: Floats) -> Neighbours:
         """Return the particles within the support of each of the points (m, 2)."""
-        return cells.find_neighbours(self.sources.positions, points, self.support_radius)
+        return find_neighbours(self.sources.positions, points, self.support_radius)
 
 
 def interpolate(

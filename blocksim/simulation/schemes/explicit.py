@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common import arrays, systems, tolerances
-from blocksim.kernels.explicit import energy, models, step
+from blocksim.kernels.explicit import models, step
 from blocksim.scenario.overlap import penetration
 from blocksim.simulation import schemes, trajectory
 from blocksim.world import build
@@ -89,7 +89,7 @@ def overlaps_of_springs(scene: Any) -> schemes.Overlaps:
 
 
 def _reach(world: arrays.World) -> float:
-    """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.explicit.depth."""
+    """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.explicit.contact."""
     controls = world.controls[0]
     rows = tolerances.ROWS_APART * controls.particle_size
     return float(controls.support if controls.model == models.KERNEL else rows)
@@ -143,8 +143,8 @@ WORLDS = schemes.Scheme(
     },
     equilibrium=equilibrium,
     give=lambda scene: float(_depths(scene.world)[1].max(initial=0.0)),
-    ledger=energy.LEDGER_ROW,
-    measure=energy.measure,
+    ledger=step.LEDGER_ROW,
+    measure=step.measure,
     contacts=lambda scene, blocks: explicit_contacts(scene.world, blocks),
     overlaps=overlaps_of_springs,
     lost_contact=particle_depth_warning,
@@ -159,6 +159,6 @@ COUPLED = replace(
     with_more_room=_inside(build.with_more_room),
     with_threads=_inside(build.with_threads),
     for_another_thread=_inside(with_own_work_space),
-    measure=lambda scene, row: energy.measure(scene.world, row),
+    measure=lambda scene, row: step.measure(scene.world, row),
 )
 EXPLICIT = replace(WORLDS, with_systems=COUPLED)

@@ -7,14 +7,14 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.common.systems import Stages
-from blocksim.kernels.soil import arrays, contact, energy, step
+from blocksim.kernels.soil import arrays, contact, step
 from blocksim.kernels.sph.functions import WENDLAND_SUPPORT
 from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments, placement
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.world import build, interactions
 from blocksim.world.systems import soils
 
-STAGES = Stages(step.start, step.finish, energy.survey, energy.measure)
+STAGES = Stages(step.start, step.finish, step.survey, step.measure)
 ACTS = {"soils": step.flow, "blocks": contact.touch_blocks, "supports": contact.touch_supports}
 # Factor of artificial viscosity. Sheared soil feels a c h/8 of it, a resistance that the material does not have; in the
 # thin front of a collapse 0.03 is several times the friction of its weight. It is there to damp waves: with 0.003 a

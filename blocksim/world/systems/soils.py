@@ -43,7 +43,7 @@ TOLERATED = 0.03  # of the thrust
 LACK = {"raw": (2.2, 0.0), "corrected": (1.0, 0.035)}
 COURANT = 0.4  # step in smoothing lengths that a wave passes
 LOSSES = ("plastic", "viscosity", "dashpot", "friction", "settling", "ramp")
-ENERGIES = ("kinetic", "potential", "elastic", "contact", *LOSSES)  # J, as kernels/soil/energy.py measures them
+ENERGIES = ("kinetic", "potential", "elastic", "contact", *LOSSES)  # J, as kernels/soil/step.py measures them
 COST = system.Cost(seconds=200e-9, memory=395)  # measured, with raw gradients
 GRADIENT_COST = {"raw": 1.0, "corrected": 1.5}  # time of a step over that, measured
 # places and velocities, stresses (tension positive), accumulated plastic shear strain

@@ -10,13 +10,16 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import ACTION, INTERACTION, zeros
-from blocksim.kernels.common.friction import friction_coefficient
-from blocksim.kernels.explicit.friction import clip_to_cone, coulomb_limit, draw_same_spring, draw_spring
+from blocksim.kernels.common.mechanics import friction_coefficient
 from blocksim.kernels.explicit.history import change_contacts
 from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point
 from blocksim.kernels.explicit.laws import (
     HERTZ_MINDLIN,
     LINEAR,
+    clip_to_cone,
+    coulomb_limit,
+    draw_same_spring,
+    draw_spring,
     elastic_force,
     stored_energy,
     tangent_stiffness,

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR
-from blocksim.kernels.common.integrate import kick_and_drift
 from blocksim.kernels.common.jit import config
+from blocksim.kernels.common.mechanics import kick_and_drift
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.forces import NOTHING
 from blocksim.kernels.explicit.partition import add_kept, keep

@@ -13,9 +13,9 @@ from scipy.sparse.csgraph import connected_components
 
 from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT
 from blocksim.kernels.nonsmooth.arrays import FAR, Nonsmooth
-from blocksim.kernels.nonsmooth.cone import solve_two
-from blocksim.kernels.nonsmooth.contact_groups import find_contact_groups
 from blocksim.kernels.nonsmooth.cuts import set_length
+from blocksim.kernels.nonsmooth.impact_rounds import find_contact_groups
+from blocksim.kernels.nonsmooth.passes import solve_two
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
 from tests.kernels.scenes import Block, after_substep, begin, collided, listed_constraints, posed, single
 

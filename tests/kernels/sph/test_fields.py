@@ -17,8 +17,7 @@ from hypothesis import given, strategies as st
 from scipy.integrate import quad
 
 from blocksim.kernels.sph import fields
-from blocksim.kernels.sph.cells import find_neighbours
-from blocksim.kernels.sph.fields import KernelName, Particles, gradient, interpolate
+from blocksim.kernels.sph.fields import KernelName, Particles, find_neighbours, gradient, interpolate
 from blocksim.kernels.sph.functions import KERNEL_CODES, kernel_slope, kernel_value, support_radius
 
 if TYPE_CHECKING:

@@ -1,20 +1,147 @@
-"""The types of four numbers in compiled code, and the machine code of what is done with them.
+"""Four numbers at a time: what a processor does to four rows of one colour with one instruction each.
 
-Types are vector registers; functions and operators are one instruction for four numbers wherever there is one.
+A value of type Lanes is a vector register with four doubles, a mask one with four flags. Compiled code has the
+operators + - * / abs < <= > >= & | ^ for them, between lanes or with one number for all four, and the public functions
+below, each one instruction for four numbers wherever there is one. Every lane is rounded as a single number would be,
+so that results do not depend on who shares a register with whom. Without the compiler the same values are numpy arrays.
+
+Most functions take `lane` first: None for all four at once, or the number of the lane that is meant, so that one source
+serves four rows and a single one.
 """
 
 import operator
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from numba import types
 from numba.extending import lower_builtin, models, register_model
 
+from blocksim.kernels.common.arrays import Records
 from blocksim.kernels.common.compiler import AbstractTemplate, cgutils, infer_global, ir, signature
-from blocksim.kernels.common.simd import functions
+
+WIDTH = 4  # numbers in a register
+Lanes = Any  # (4,) float64
+Mask = Any  # (4,) bool
+Places = Any  # numbers of four records: a field of four or a tuple
+Lane = Any  # None where a function is to deal with all lanes of a group at once; else the number of one
+
+
+def spread(number: float) -> Lanes:
+    """Return one number in all lanes."""
+    return np.full(WIDTH, number)
+
+
+def select(mask: Mask, yes: Lanes, no: Lanes) -> Lanes:
+    """Return one or the other in every lane, or of two single numbers."""
+    chosen: Any = np.where(mask, yes, no)
+    return chosen[()]
+
+
+def branch(mask: Mask, yes: Lanes, no: Lanes) -> Lanes:
+    """Return the same as `select`; of two single numbers by a branch.
+
+    What the processor predicts, it does not wait for: worth it where the flag is known late and seldom changes.
+    """
+    return select(mask, yes, no)
+
+
+def greater(x: Lanes, y: Lanes) -> Lanes:
+    """Return the greater number in every lane, or of two single numbers; the second where they do not compare."""
+    return select(x > y, x, y)
+
+
+def lesser(x: Lanes, y: Lanes) -> Lanes:
+    """Return the lesser number in every lane, or of two single numbers; the second where they do not compare."""
+    return select(x < y, x, y)
+
+
+def root(x: Lanes) -> Lanes:
+    """Return the square root in every lane, or of a single number."""
+    found: Any = np.sqrt(x)
+    return found
+
+
+def is_all(mask: Mask) -> bool:
+    """Return True if all flags are set, or a single one."""
+    return bool(np.all(mask))
+
+
+def split(x: Lanes) -> tuple[float, float, float, float]:
+    """Return the numbers in the lanes, or a single one four times."""
+    return tuple(np.broadcast_to(x, WIDTH))
+
+
+def four(lane: Lane, one: float, two: float, three: float, last: float) -> Lanes:
+    """Return four numbers as lanes, or the first of them where a single lane is meant."""
+    return np.array([one, two, three, last]) if lane is None else one
+
+
+def load(lane: Lane, field: Any) -> Lanes:
+    """Return the numbers in a field of four, or the one of a lane."""
+    return np.array(field) if lane is None else field[lane]
+
+
+def store(lane: Lane, field: Any, x: Lanes) -> None:
+    """Write a field of four numbers, or the one of a lane."""
+    field[slice(None) if lane is None else lane] = x
+
+
+def _fields(lane: Lane, records: Records, places: Places, first: int) -> tuple[Lanes, ...]:
+    of = [records[place] for place in (places if lane is None else places[lane : lane + 1])]
+    columns = [np.array([float(one[k]) for one in of]) for k in range(first, first + WIDTH)]
+    return tuple(column if lane is None else column[0] for column in columns)
+
+
+def fields_0(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Return the first four fields, all doubles, of the records at four places."""
+    return _fields(lane, records, places, 0)
+
+
+def fields_4(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Return the next four fields of the records at four places."""
+    return _fields(lane, records, places, 4)
+
+
+def fields_8(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Return the four fields after those of the records at four places."""
+    return _fields(lane, records, places, 8)
+
+
+def fields_12(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Return the four fields after those of the records at four places; what is no double there makes no sense."""
+    return _fields(lane, records, places, 12)
+
+
+def fields_16(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Return four fields of the records at four places, from the seventeenth on."""
+    return _fields(lane, records, places, 16)
+
+
+def _write(lane: Lane, records: Records, places: Places, mask: Mask, columns: tuple[Lanes, ...], first: int) -> None:
+    for k in range(WIDTH) if lane is None else [lane]:
+        if np.atleast_1d(mask)[k if lane is None else 0]:
+            for place, column in enumerate(columns, first):
+                records[places[k]][place] = np.atleast_1d(column)[k if lane is None else 0]
+
+
+def write_fields_0(lane: Lane, records: Records, places: Places, mask: Mask, columns: tuple[Lanes, ...]) -> None:
+    """Write the first four fields, all doubles, of the records at four places; of those whose flag is set."""
+    _write(lane, records, places, mask, columns, 0)
+
+
+def write_fields_4(lane: Lane, records: Records, places: Places, mask: Mask, columns: tuple[Lanes, ...]) -> None:
+    """Write the next four fields."""
+    _write(lane, records, places, mask, columns, 4)
+
+
+def write_fields_8(lane: Lane, records: Records, places: Places, mask: Mask, columns: tuple[Lanes, ...]) -> None:
+    """Write the four fields after those."""
+    _write(lane, records, places, mask, columns, 8)
+
 
 DOUBLE = ir.DoubleType()
-VECTOR = ir.VectorType(DOUBLE, functions.WIDTH)
+VECTOR = ir.VectorType(DOUBLE, WIDTH)
 BYTE = ir.IntType(8)
 INDEX = ir.IntType(32)
 SIZE = ir.IntType(64)
@@ -49,7 +176,7 @@ class _LanesModel(models.PrimitiveModel):
 @register_model(MaskType)
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, of: Any) -> None:
-        super().__init__(manager, of, ir.VectorType(ir.IntType(1), functions.WIDTH))
+        super().__init__(manager, of, ir.VectorType(ir.IntType(1), WIDTH))
 
 
 LIKELY = (2000, 1)  # weights of a branch that is to stay one
@@ -60,9 +187,7 @@ def _spread(builder: Any, value: Any) -> Any:
     if value.type == VECTOR:
         return value
     single = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), value, INDEX(0))
-    return builder.shuffle_vector(
-        single, single, ir.Constant(ir.VectorType(INDEX, functions.WIDTH), [0] * functions.WIDTH)
-    )
+    return builder.shuffle_vector(single, single, ir.Constant(ir.VectorType(INDEX, WIDTH), [0] * WIDTH))
 
 
 def _declare(function: Callable[..., Any], answer: Callable[[tuple[Any, ...]], Any]) -> None:
@@ -96,7 +221,7 @@ def _transposed(builder: Any, four: list[Any]) -> list[Any]:
     """Return the columns of four vectors."""
 
     def mixed(x: Any, y: Any, *places: int) -> Any:
-        return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(INDEX, functions.WIDTH), list(places)))
+        return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(INDEX, WIDTH), list(places)))
 
     even = [mixed(four[k], four[k + 1], 0, 4, 2, 6) for k in (0, 2)]
     odd = [mixed(four[k], four[k + 1], 1, 5, 3, 7) for k in (0, 2)]
@@ -107,7 +232,7 @@ def _transposed(builder: Any, four: list[Any]) -> list[Any]:
 def _one_of(builder: Any, lane: Any, places: list[Any]) -> Any:
     """Return the place in a lane; of a lane that is known the optimization leaves nothing but that."""
     chosen = places[0]
-    for k in range(1, functions.WIDTH):
+    for k in range(1, WIDTH):
         chosen = builder.select(builder.icmp_signed("==", lane, ir.Constant(lane.type, k)), places[k], chosen)
     return chosen
 
@@ -117,12 +242,12 @@ def _record_pointers(context: Any, builder: Any, signature: Any, arguments: Any,
     array, field = signature.args[1:3]
     start = builder.bitcast(context.make_array(array)(context, builder, arguments[1]).data, BYTE.as_pointer())
     if isinstance(field, types.UniTuple):
-        places = cgutils.unpack_tuple(builder, arguments[2], functions.WIDTH)
+        places = cgutils.unpack_tuple(builder, arguments[2], WIDTH)
         if signature.args[0] != types.none:
             places = [_one_of(builder, arguments[0], places)]
     else:
         first = context.make_array(field)(context, builder, arguments[2]).data
-        lanes = [INDEX(k) for k in range(functions.WIDTH)] if signature.args[0] == types.none else arguments[:1]
+        lanes = [INDEX(k) for k in range(WIDTH)] if signature.args[0] == types.none else arguments[:1]
         places = [builder.load(builder.gep(first, [lane])) for lane in lanes]
     pointers = []
     for place in places:
@@ -141,7 +266,7 @@ def _read_fields(part: int) -> Callable[..., Any]:
             four = [builder.load(builder.gep(one, [INDEX(part)]), align=ALIGNMENT) for one in pointers]
             return context.make_tuple(builder, signature.return_type, _transposed(builder, four))
         (one,) = _record_pointers(context, builder, signature, arguments, DOUBLE)
-        numbers = [builder.load(builder.gep(one, [INDEX(functions.WIDTH * part + k)])) for k in range(functions.WIDTH)]
+        numbers = [builder.load(builder.gep(one, [INDEX(WIDTH * part + k)])) for k in range(WIDTH)]
         return context.make_tuple(builder, signature.return_type, numbers)
 
     return generate
@@ -152,7 +277,7 @@ def _write_fields(part: int) -> Callable[..., Any]:
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         mask = arguments[3]
-        columns = cgutils.unpack_tuple(builder, arguments[4], functions.WIDTH)
+        columns = cgutils.unpack_tuple(builder, arguments[4], WIDTH)
         if signature.args[0] == types.none:
             pointers = _record_pointers(context, builder, signature, arguments, VECTOR)
             for k, four in enumerate(_transposed(builder, columns)):
@@ -162,19 +287,19 @@ def _write_fields(part: int) -> Callable[..., Any]:
             (one,) = _record_pointers(context, builder, signature, arguments, DOUBLE)
             with builder.if_then(mask, likely=True):
                 for k, column in enumerate(columns):
-                    builder.store(column, builder.gep(one, [INDEX(functions.WIDTH * part + k)]))
+                    builder.store(column, builder.gep(one, [INDEX(WIDTH * part + k)]))
         return context.get_dummy_value()
 
     return generate
 
 
 def _split(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    numbers = [builder.extract_element(arguments[0], INDEX(k)) for k in range(functions.WIDTH)]
+    numbers = [builder.extract_element(arguments[0], INDEX(k)) for k in range(WIDTH)]
     return context.make_tuple(builder, signature.return_type, numbers)
 
 
 def _repeat(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    return context.make_tuple(builder, signature.return_type, functions.WIDTH * list(arguments))
+    return context.make_tuple(builder, signature.return_type, WIDTH * list(arguments))
 
 
 def _four(_: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -214,7 +339,7 @@ def _called(name: str, kind: Any) -> Callable[..., Any]:
 
 
 def _all(builder: Any, mask: Any) -> Any:
-    bits = builder.bitcast(mask, ir.IntType(functions.WIDTH))
+    bits = builder.bitcast(mask, ir.IntType(WIDTH))
     return builder.icmp_unsigned("==", bits, ir.Constant(bits.type, -1))
 
 
@@ -252,17 +377,17 @@ def _define_all() -> None:
     _define(operator.and_, MASK, lambda builder, x, y: builder.and_(x, y), (MASK, MASK))
     _define(operator.or_, MASK, lambda builder, x, y: builder.or_(x, y), (MASK, MASK))
     _define(operator.xor, MASK, lambda builder, x, y: builder.xor(x, y), (MASK, MASK))
-    _define(functions.is_all, types.boolean, _all, (MASK,))
-    _define(functions.is_all, types.boolean, lambda _, flag: flag, (types.boolean,))
+    _define(is_all, types.boolean, _all, (MASK,))
+    _define(is_all, types.boolean, lambda _, flag: flag, (types.boolean,))
     _define(operator.neg, LANES, lambda builder, x: builder.fneg(x), (LANES,))
     _define(abs, LANES, _called("llvm.fabs.v4f64", VECTOR), (LANES,))
-    _define(functions.root, LANES, _called("llvm.sqrt.v4f64", VECTOR), (LANES,))
-    _define(functions.root, types.float64, _called("llvm.sqrt.f64", DOUBLE), (types.float64,))
-    _define(functions.spread, LANES, _spread, (types.float64,))
-    _two(functions.greater, LANES, _chosen(">"))
-    _two(functions.lesser, LANES, _chosen("<"))
-    _define(functions.greater, types.float64, _chosen(">"), (types.float64, types.float64))
-    _define(functions.lesser, types.float64, _chosen("<"), (types.float64, types.float64))
+    _define(root, LANES, _called("llvm.sqrt.v4f64", VECTOR), (LANES,))
+    _define(root, types.float64, _called("llvm.sqrt.f64", DOUBLE), (types.float64,))
+    _define(spread, LANES, _spread, (types.float64,))
+    _two(greater, LANES, _chosen(">"))
+    _two(lesser, LANES, _chosen("<"))
+    _define(greater, types.float64, _chosen(">"), (types.float64, types.float64))
+    _define(lesser, types.float64, _chosen("<"), (types.float64, types.float64))
 
 
 def _define_select() -> None:
@@ -272,12 +397,10 @@ def _define_select() -> None:
         return builder.select(mask, _spread(builder, yes), _spread(builder, no))
 
     one = types.float64
-    for function in (functions.select, functions.branch):
+    for function in (select, branch):
         _define(function, LANES, choose, (MASK, LANES, LANES), (MASK, LANES, one), (MASK, one, LANES), (MASK, one, one))
-    _define(
-        functions.select, one, lambda builder, mask, yes, no: builder.select(mask, yes, no), (types.boolean, one, one)
-    )
-    _define(functions.branch, one, _branched, (types.boolean, one, one))
+    _define(select, one, lambda builder, mask, yes, no: builder.select(mask, yes, no), (types.boolean, one, one))
+    _define(branch, one, _branched, (types.boolean, one, one))
 
 
 def _define_memory() -> None:
@@ -291,34 +414,32 @@ def _define_memory() -> None:
         _declare(function, answer)
         return lower_builtin(function, *kinds)
 
-    columns, single = types.UniTuple(LANES, functions.WIDTH), types.UniTuple(types.float64, functions.WIDTH)
+    columns, single = types.UniTuple(LANES, WIDTH), types.UniTuple(types.float64, WIDTH)
     for function, part in (
-        (functions.fields_0, 0),
-        (functions.fields_4, 1),
-        (functions.fields_8, 2),
-        (functions.fields_12, 3),
-        (functions.fields_16, 4),
+        (fields_0, 0),
+        (fields_4, 1),
+        (fields_8, 2),
+        (fields_12, 3),
+        (fields_16, 4),
     ):
         typed(function, columns, types.NoneType, types.Array, types.NestedArray)(_read_fields(part))
         typed(function, columns, types.NoneType, types.Array, types.UniTuple)(_read_fields(part))
         typed(function, single, types.Integer, types.Array, types.NestedArray)(_read_fields(part))
         typed(function, single, types.Integer, types.Array, types.UniTuple)(_read_fields(part))
-    for writer, part in ((functions.write_fields_0, 0), (functions.write_fields_4, 1), (functions.write_fields_8, 2)):
+    for writer, part in ((write_fields_0, 0), (write_fields_4, 1), (write_fields_8, 2)):
         for lane, mask in ((types.NoneType, MaskType), (types.Integer, types.Boolean)):
             for places in (types.NestedArray, types.UniTuple):
                 typed(writer, types.none, lane, types.Array, places, mask, types.UniTuple)(_write_fields(part))
-    typed(functions.split, single, LanesType)(_split)
-    typed(functions.split, single, types.Float)(_repeat)
-    typed(functions.four, LANES, types.NoneType, *[types.Float] * functions.WIDTH)(_four)
-    typed(functions.four, types.float64, types.Integer, *[types.Float] * functions.WIDTH)(_four)
-    typed(functions.load, LANES, types.NoneType, types.NestedArray)(_load)
-    typed(functions.load, types.float64, types.Integer, types.NestedArray)(_load)
-    typed(functions.store, types.none, types.NoneType, types.NestedArray, LanesType)(_store)
-    typed(functions.store, types.none, types.Integer, types.NestedArray, types.Float)(_store)
+    typed(split, single, LanesType)(_split)
+    typed(split, single, types.Float)(_repeat)
+    typed(four, LANES, types.NoneType, *[types.Float] * WIDTH)(_four)
+    typed(four, types.float64, types.Integer, *[types.Float] * WIDTH)(_four)
+    typed(load, LANES, types.NoneType, types.NestedArray)(_load)
+    typed(load, types.float64, types.Integer, types.NestedArray)(_load)
+    typed(store, types.none, types.NoneType, types.NestedArray, LanesType)(_store)
+    typed(store, types.none, types.Integer, types.NestedArray, types.Float)(_store)
 
 
-def teach_compiler() -> None:
-    """Let compiled code use lanes."""
-    _define_all()
-    _define_select()
-    _define_memory()
+_define_all()
+_define_select()
+_define_memory()

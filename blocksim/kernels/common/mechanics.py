@@ -1,8 +1,11 @@
-"""Velocity Verlet: kick, drift, forces, kick. Symplectic; position and velocity at the same times."""
+"""Mechanics of single bodies, for every scheme: velocity Verlet, energies and speeds, and Coulomb's coefficient.
+
+Velocity Verlet is kick, drift, forces, kick: symplectic, with position and velocity at the same times.
+"""
 
 import math
 
-from blocksim.kernels.common import arrays, jit, shapes
+from blocksim.kernels.common import arrays, jit, shapes, tolerances
 
 
 @jit.kernel
@@ -87,6 +90,28 @@ def kinetic_energy(world: arrays.World) -> float:
 
 
 @jit.rare_kernel
+def potential_energy(world: arrays.World) -> float:
+    """Return the energy (J) of all masses in the field of gravity, zero at the origin."""
+    total = 0.0
+    controls = world.controls[0]
+    for i in range(world.bodies.size - 1):
+        body = world.bodies[i]
+        total -= body.mass * (controls.gravity_x * body.x + controls.gravity_y * body.y)
+    return total
+
+
+@jit.rare_kernel
+def weights_power(world: arrays.World) -> float:
+    """Return the power (W) of all weights, each counted positive: summed over time, the travel of the weights."""
+    total = 0.0
+    controls = world.controls[0]
+    for i in range(world.bodies.size - 1):
+        body = world.bodies[i]
+        total += body.mass * abs(controls.gravity_x * body.vx + controls.gravity_y * body.vy)
+    return total
+
+
+@jit.rare_kernel
 def fastest_point(bodies: arrays.Records) -> float:
     """Return an upper bound (m/s) of the speed of any point of any body; infinite when a state is not finite."""
     fastest = 0.0
@@ -97,3 +122,11 @@ def fastest_point(bodies: arrays.Records) -> float:
             return math.inf
         fastest = max(fastest, speed)
     return fastest
+
+
+@jit.kernel
+def friction_coefficient(static: float, kinetic: float, transition_speed: float, speed: float) -> float:
+    """Return mu(v) = mu_k + (mu_s - mu_k) exp(-|v|/v_s): static at rest, kinetic when sliding fast."""
+    if static == kinetic or abs(speed) > tolerances.FULLY_KINETIC * transition_speed:
+        return kinetic
+    return kinetic + (static - kinetic) * math.exp(-abs(speed) / transition_speed)
