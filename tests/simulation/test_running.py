@@ -19,7 +19,6 @@ import pandas as pd
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.kernels.common.jit import source_hash
 from blocksim.scenario import Scenario, load_scenario, placement
 from blocksim.simulation import Progress, Result, provenance, read_result, simulate_into
 from blocksim.simulation.balance import RESIDUAL_PROMISE
@@ -238,19 +237,6 @@ def test_summary_of_an_older_version_is_read(kept: Result, tmp_path: Path) -> No
     back = read_summary(tmp_path / "run.json")
     assert (back.threads, back.sha256) == (1, {})
     assert back.final_state_sha256 == kept.summary.final_state_sha256
-
-
-def test_rooms_are_reported_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = provenance.code_hashes()
-    assert set(before) == set(provenance.ROOMS)
-    assert len(set(before.values())) == len(before)
-
-    def edited(folder: Path) -> str:
-        return source_hash(folder) + ("edited" if folder.name == "world" else "")
-
-    monkeypatch.setattr("blocksim.kernels.common.jit.source_hash", edited)
-    after = provenance.code_hashes.__wrapped__()
-    assert {room for room in after if after[room] != before[room]} == {"world"}
 
 
 def test_command_with_a_name_that_is_no_text_can_be_written(kept: Result, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -98,22 +98,6 @@ def test_a_particle_that_has_flown_off_leaves_a_corner_with_a_fifth_of_the_speed
     assert np.linalg.norm(found - 0.3) == pytest.approx(leaving, rel=1e-6)
 
 
-def test_particles_that_have_parted_do_not_bounce_off_one_another() -> None:
-    soil = Soil(scene(column(0.04, 0.04, SPACING), gravity=0.0))
-    points, number = soil.soils.points, soil.soils.states["number"]
-
-    def pair() -> list[int]:
-        return [int(np.flatnonzero(number == one)[0]) for one in (0, 1)]
-
-    place(soil, 0, x=0.2, y=0.2, vx=-0.5)
-    place(soil, 1, x=0.2 + SPACING, y=0.2, vx=0.5)
-    soil.to_time(0.015)
-    assert np.diff(points["x"][pair()])[0] > 3.0 * SPACING  # nothing holds them
-    points["vx"][pair()] = 0.5, -0.5
-    soil.to_time(0.06)
-    assert abs(np.diff(points["vx"][pair()])[0]) < 0.25
-
-
 def test_particles_too_near_to_one_another_end_the_run() -> None:
     soil = Soil(scene(column(0.1, 0.05, SPACING)))
     soil.soils.points["x"][:160] = np.linspace(0.02, 0.021, 160)

@@ -15,10 +15,9 @@ from blocksim.statics.joint_forces import joint_forces
 from blocksim.statics.programme import Equilibrium, Programme, horizontal_margin
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
 EXACT = 1e-4  # relative
-G = 9.81
 STONE = {"stone": {"density": 2000.0, "young_modulus": 1e10, "poisson_ratio": 0.2}}
 TIME = {"scheme": "nonsmooth", "end": 1.0}
 
@@ -66,9 +65,7 @@ def pushed(blocks: Blockwork, sign: float = 1.0) -> Equilibrium:
     return found
 
 
-@pytest.mark.parametrize(
-    ("friction", "thickness"), [(0.75, 0.10672), (0.375, 0.12597), (0.35, 0.15118), (0.325, 0.17821)]
-)
+@pytest.mark.parametrize(("friction", "thickness"), [(0.75, 0.10672), (0.325, 0.17821)])
 def test_least_thickness_of_an_arch_of_27_voussoirs_is_the_published_one(friction: float, thickness: float) -> None:
     assert least_thickness(friction) == pytest.approx(thickness, rel=EXACT)
 
@@ -80,34 +77,6 @@ def test_wall_one_of_ferris_and_tin_loi_has_their_bound_and_nearly_their_least_f
         assert found.factor == pytest.approx(0.64286, rel=EXACT)
         estimate = Programme(blocks).estimate(blocks.forces, sign * blocks.horizontal, found.factor)
         assert 0.63982 * (1.0 - EXACT) < estimate < 0.63982 * 1.0005
-
-
-@pytest.mark.parametrize(("force", "peak"), [(44.8e3, 15.89), (104.8e3, 38.53), (254.8e3, 95.14)])
-def test_a_dry_granite_wall_carries_the_force_at_its_head_that_a_linear_programme_by_hand_gives(
-    force: float, peak: float
-) -> None:
-    """Vasconcelos & Lourenco (2009): 1 x 1.2 m, eight courses; another programme has 15.9, 38.6 and 95.2 kN."""
-    weight = 4.8e3
-    beam = {"block": "beam", "name": "beam", "x": 0.5, "y": 1.325}
-    loads: Sequence[Mapping[str, object]] = [
-        {"kind": "force", "body": "beam", "magnitude": force - weight, "direction": "-90 deg"},
-        {"kind": "force", "body": "beam", "magnitude": 1.0},
-    ]
-    granite = STONE["stone"] | {"density": weight / G / (1.0 * 1.2 * 0.2)}
-    sizes = {"brick": brick(0.2, 0.15, 0.2), "half": brick(0.1, 0.15, 0.2)}
-    blocks = blockwork(
-        0.65,
-        gravity=G,
-        materials={"stone": granite, "light": granite | {"density": 1e-3}},
-        blocks={**sizes, "beam": brick(1.0, 0.25, 0.2) | {"material": "light"}},
-        bodies=[*flush_wall(8, 5, 0.2, 0.15), beam],
-        loads=loads,
-    )
-    live = np.zeros_like(blocks.forces)
-    live[blocks.names.index("beam"), 0] = 1.0
-    found = Programme(blocks).greatest(blocks.forces - live, live)
-    assert found is not None
-    assert 1e-3 * found.factor == pytest.approx(peak, abs=0.005)
 
 
 @pytest.mark.parametrize(("friction", "width", "height"), [(0.3, 0.3, 0.2), (0.9, 0.1, 0.4)])
@@ -144,24 +113,6 @@ def test_below_a_head_that_stays_parallel_a_wall_carries_what_virtual_work_says(
     assert found is not None
     wall, head = blocks.masses * 9.81
     assert found.factor == pytest.approx((50e3 + head + 0.5 * wall) / 1.2, rel=1e-9)
-
-
-@pytest.mark.parametrize("angle", [20.0, 35.0, 50.0])
-def test_a_wedge_between_two_fixed_slopes_carries_what_both_friction_cones_allow(angle: float) -> None:
-    """A triangle on its tip, pushed up: P = W tan(angle + phi) on the slope that it climbs, the other one opens."""
-    half, height = 0.1 * math.tan(math.radians(90.0 - angle)), 0.1
-    tip = {"outline": [[0.0, 0.0], [half, height], [-half, height]], "depth": 1.0, "material": "stone"}
-    slopes = [[[0.0, 0.0], [2.0 * half, 0.0], [2.0 * half, 2.0 * height]], [[0.0, 0.0], [-2.0 * half, 2.0 * height],
-        [-2.0 * half, 0.0]]]  # fmt: skip
-    friction = 0.2
-    sides = {f"slope_{k}": {"outline": one, "depth": 1.0, "material": "stone"} for k, one in enumerate(slopes)}
-    centres = [np.mean(one, axis=0) for one in slopes]
-    fixed = [{"block": f"slope_{k}", "x": x, "y": y, "fixed": True} for k, (x, y) in enumerate(centres)]
-    wedge = {"block": "tip", "x": 0.0, "y": 2.0 / 3.0 * height}
-    blocks = blockwork(friction, blocks={"tip": tip, **sides}, bodies=[wedge, *fixed])
-    expected = math.tan(math.radians(angle) + math.atan(friction))
-    for sign in (1.0, -1.0):
-        assert pushed(blocks, sign).factor == pytest.approx(expected, rel=EXACT)
 
 
 def test_forces_are_in_equilibrium_and_in_their_cones_and_the_mechanism_does_the_work_that_the_factor_says() -> None:

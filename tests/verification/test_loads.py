@@ -39,17 +39,8 @@ def block(scheme: str, width: float, height: float, on_ground: float, **changes:
     }
 
 
-LONG = pytest.mark.long  # the other scheme shows the same load, and the other load the same scheme
-
-
 @pytest.mark.parametrize(
-    ("scheme", "friction", "ratio"),
-    [
-        ("explicit", 2.0, TURNS_OVER),
-        ("nonsmooth", FRICTION, SLIDES),
-        pytest.param("nonsmooth", 2.0, TURNS_OVER, marks=LONG),
-        pytest.param("explicit", FRICTION, SLIDES, marks=LONG),
-    ],
+    ("scheme", "friction", "ratio"), [("explicit", 2.0, TURNS_OVER), ("nonsmooth", FRICTION, SLIDES)]
 )
 def test_a_dam_turns_over_and_slides_at_its_base_of_statics(
     tmp_path: Path, scheme: str, friction: float, ratio: float
@@ -66,15 +57,7 @@ LOW = ((0.1, 0.05), math.degrees(math.atan(0.38)))
 SLENDER = ((0.02, 0.1), math.degrees(math.atan(0.2)))
 
 
-@pytest.mark.parametrize(
-    ("scheme", "size", "critical"),
-    [
-        ("explicit", *LOW),
-        ("nonsmooth", *LOW),
-        ("nonsmooth", *SLENDER),
-        pytest.param("explicit", *SLENDER, marks=LONG),
-    ],
-)
+@pytest.mark.parametrize(("scheme", "size", "critical"), [("explicit", *LOW), ("nonsmooth", *SLENDER)])
 def test_a_block_on_a_tilting_table_moves_at_its_angle_of_statics(
     scheme: str, size: tuple[float, float], critical: float
 ) -> None:
@@ -110,23 +93,6 @@ def test_the_shipped_dam_stands_until_its_base_is_too_narrow() -> None:
     assert 3.9 < narrow.first_moved_s < 6.0  # as the level comes near the crest
 
 
-def test_water_on_the_battered_back_of_a_dam_adds_its_weight(tmp_path: Path) -> None:
-    """Thrust gamma H^2/2 over the friction of its weight and of the water above the back: where it slides."""
-    width, lean = 6.0, 2.0  # m, of the base, and the foot of the back beyond its crest
-    outline = [[0.0, 0.0], [width, 0.0], [width, HEIGHT], [lean, HEIGHT]]
-    water = {"kind": "pressure", "body": "1", "face": "left", "water_level": HEIGHT, "unit_weight": WATER}
-    dam = block("nonsmooth", 1.0, HEIGHT, 1.0, loads=[water])
-    area = (width - 0.5 * lean) * HEIGHT
-    below = HEIGHT * (width**2 / 2.0 - lean**2 / 6.0) / area  # from the corner at the back to the centroid
-    dam["blocks"] = {"b": {"outline": outline, "depth": 1.0, "material": "concrete"}}
-    rise = (0.5 * width * HEIGHT**2 - lean * HEIGHT**2 / 3.0) / area
-    dam["bodies"] = [{"block": "b", "x": below, "y": rise}]
-    slides = 0.5 * WATER * HEIGHT**2 / (CONCRETE * area + 0.5 * WATER * HEIGHT * lean)
-    within = {"friction.block_ground": {"from": 0.99 * slides, "to": 1.01 * slides, "count": 2}}
-    (change,) = limit(dam, within, tolerance=0.03, out=tmp_path / "limit", jobs=1, keep_runs=False).limits
-    assert (change.below, change.above) == (Stability.FALLS, Stability.STANDS)
-
-
 SCHEMES = ("explicit", "nonsmooth")
 # At the onset of slip a base follows the support until contacts have built up the limiting shear force: springs need
 # sqrt(m/k) for that, rigid contacts a substep; the velocity that is gained stays until the block sticks again. A pulse
@@ -141,21 +107,11 @@ def under_sine(scheme: str, share: float, **values: Any) -> Result:
     return simulate(load_scenario(SCENARIOS / "pulse.toml", overrides))
 
 
-LIMITS = {"falls": (0.7362, True), "survives": (1.7066, False), "falls again": (1.8733, True)}
-OVERTURNING = [
-    pytest.param(scheme, *LIMITS[name], id=f"{name}-{scheme}", marks=pytest.mark.long if is_long else ())
-    for name in LIMITS
-    for scheme, is_long in (("explicit", True), ("nonsmooth", False))
-]
-
-
-@pytest.mark.parametrize(("scheme", "limit", "falls_above"), OVERTURNING)
-def test_a_one_sine_pulse_overturns_from_the_published_amplitudes_on(
-    scheme: str, limit: float, falls_above: bool
-) -> None:
+@pytest.mark.parametrize(("limit", "falls_above"), [(0.7362, True), (1.7066, False), (1.8733, True)])
+def test_a_one_sine_pulse_overturns_from_the_published_amplitudes_on(limit: float, falls_above: bool) -> None:
     """J. Zhang and N. Makris, J. Eng. Mech. 127 (2001) 473: Housner's block, integrated; each limit within 1 %."""
     for share, falls in ((0.99 * limit, not falls_above), (1.01 * limit, falls_above)):
-        turned = np.degrees(np.abs(under_sine(scheme, share, **{"time.end": 7.0}).frames.rotation).max())
+        turned = np.degrees(np.abs(under_sine("nonsmooth", share, **{"time.end": 7.0}).frames.rotation).max())
         assert (turned > 80.0) == falls
         assert turned > 80.0 or turned < 45.0  # decided by then
 
@@ -230,24 +186,14 @@ def test_stick_and_slip_on_a_table_that_starts_at_its_largest_acceleration(
 @pytest.mark.parametrize(
     ("places", "within"),
     [
-        ([(0.0, 0.05), (0.4, 0.05)], 1e-3),
-        ([(0.4 * k, 0.05) for k in range(15)], 1e-3),
         ([(0.0, 0.05), (0.0, 0.15)], 1e-3),
         ([(0.4 * k, y) for k in range(8) for y in (0.05, 0.15)], 5e-3),  # steps of 1 ms
     ],
-    ids=["two", "fifteen", "stack of two", "eight stacks"],
+    ids=["a stack", "eight"],
 )
 def test_rigid_blocks_slip_on_that_table_as_one_does(places: list[tuple[float, float]], within: float) -> None:
     _, slip, _ = sliding("nonsmooth", (0.2, 0.1, 0.8, 5.05), "50 ms", places=places, **COSINE)
     assert slip[[40, 100]] == pytest.approx([SLIP, -2.0 * SLIP], rel=within)
-
-
-@pytest.mark.parametrize(("width", "height", "scale"), [(0.5, 0.45, 1.0), (0.2, 0.1, 0.1)])
-def test_the_slip_of_springs_depends_neither_on_the_proportions_of_a_block_nor_on_their_stiffness(
-    width: float, height: float, scale: float
-) -> None:
-    _, slip, _ = sliding("explicit", (width, height, 0.8, 0.5), "50 ms", stiffness_scale=scale, **COSINE)
-    assert slip[-1] == pytest.approx(SLIP, rel=5e-3)
 
 
 def test_an_abrupt_pulse_on_springs_that_carry_nothing_of_it_is_warned_of_by_as_much_as_the_slip_is_off() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from blocksim.kernels.common.arrays import REACHED, Record, Records, World
+from blocksim.kernels.common.arrays import REACHED, Record, Records
 from blocksim.kernels.common.tolerances import CONE_TOLERANCE
 from blocksim.scenario import Scenario, place_segments, scenario_from_mapping
 from blocksim.scenario.geometry import centre_outline, regular
@@ -97,16 +97,6 @@ def test_upper_faces_of_slabs_are_the_line_of_the_profile(steps: list[tuple[floa
         assert slab.radius == pytest.approx(hypot(slab.half_x, slab.half_y))
 
 
-@pytest.mark.parametrize(("model", "law"), [("surface", "linear"), ("surface", "hertz-mindlin"), ("kernel", "linear")])
-def test_level_profile_is_the_half_plane(model: str, law: str) -> None:
-    usual = scene_of([THROWN], model=model, law=law)
-    profile = [[-1.0, 0.0], [0.01, 0.0], [1.0, 0.0]]
-    pieces = scene_of([THROWN], model=model, law=law, ground={"profile": profile})
-    for time in (0.02, 0.05, 0.1):
-        assert block_state(pieces.to_time(time)) == pytest.approx(block_state(usual.to_time(time)), abs=1e-11)
-    assert abs(usual.bodies[0].angle) < 0.1  # it has fallen flat, or nearly so
-
-
 def turned(vector: Sequence[float], angle: float) -> list[float]:
     """Return a vector turned by an angle (rad)."""
     x, y = vector
@@ -142,22 +132,9 @@ def test_block_sliding_over_an_edge_gets_no_kick(model: str, drop: float) -> Non
     assert scene.residual() < 1e-3
 
 
-@pytest.mark.parametrize("model", ["surface"])
-def test_block_landing_on_a_peak_is_held_by_its_point(model: str) -> None:
-    peak = {"profile": [[-1.0, -1.0], [0.0, 0.0], [1.0, -1.0]]}
-    scene = scene_of([{"x": 5e-4, "y": HEIGHT / 2 + 1e-3}], model=model, restitution=0.0, ground=peak)
-    scene.to_time(0.03)
-    assert scene.bodies[0].y == pytest.approx(HEIGHT / 2, abs=2e-4)
-    assert abs(scene.bodies[0].vy) < 1e-3
-    assert scene.contacts > 0
-    force = float(scene.contact_records.normal_force.sum())
-    assert force == pytest.approx(float(scene.bodies[0].mass) * 9.81, rel=0.02)
-
-
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("seed", range(2))
-def test_nothing_falls_through_a_valley(model: str, seed: int) -> None:
-    random = np.random.default_rng(seed)
+def test_nothing_falls_through_a_valley(model: str) -> None:
+    random = np.random.default_rng(1)
     thrown = {
         "y": 0.06,
         "x": random.uniform(-0.02, 0.02),
@@ -191,8 +168,6 @@ def test_leaning_wall_sends_a_block_back_with_the_restitution_asked(model: str) 
     assert scene.bodies[0].spin == pytest.approx(0.0, abs=0.05)
 
 
-sides = st.floats(1e-2, 0.1)
-spacings = st.floats(5e-4, 3e-3)
 WITH_PARTICLES = ["kernel", "particles"]
 
 
@@ -200,54 +175,9 @@ def dense(bodies: Sequence[Mapping[str, object]], model: str, spacing: float, **
     return scenario_of(bodies, contact={"model": model, "particle_spacing": spacing}, **tables)
 
 
-def particles_of(world: World, body: int) -> Records:
-    """Return the particles of one body."""
-    record = world.bodies[body]
-    found: Records = world.particles[record.first_particle : record.first_particle + record.particle_count]
-    return found
-
-
-@settings(max_examples=30)
-@given(width=sides, height=sides, spacing=spacings)
-def test_kernel_particles_lie_on_the_edge_and_share_every_face(width: float, height: float, spacing: float) -> None:
-    world = build_world(dense([{"y": 0.5, "width": width, "height": height}], "kernel", spacing))
-    particles = particles_of(world, 0)
-    assert particles.length.sum() == pytest.approx(2.0 * (width + height), rel=1e-12)
-    assert np.maximum(np.abs(particles.x) - width / 2, np.abs(particles.y) - height / 2) == pytest.approx(
-        0.0, abs=1e-15
-    )
-    for normal in ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)):
-        face = particles[(particles.nx == normal[0]) & (particles.ny == normal[1])]
-        outward = face.x * normal[0] + face.y * normal[1]
-        assert outward == pytest.approx(np.abs(0.5 * np.array([width, height]) @ normal), abs=1e-15)
-        assert face.share.sum() == pytest.approx(1.0, rel=1e-12)
-        along = np.sort(face.x * normal[1] - face.y * normal[0])
-        assert np.diff(along).max() <= spacing * (1.0 + 1e-9)
-        assert along[-1] - along[0] == pytest.approx(height if normal[1] == 0.0 else width, rel=1e-12)
-    assert (
-        particles.size == 2 * (division(width, spacing) + division(height, spacing)) + 4
-    )  # corners belong to two faces
-
-
 def test_round_off_in_the_division_adds_no_particle() -> None:
     assert division(0.3, 0.1) == 3  # 0.3/0.1 is just below 3, 0.1 * 3 just above 0.3
     assert [division(side, 1e-3) for side in (0.032, 0.025)] == [32, 25]
-
-
-@settings(max_examples=30)
-@given(width=sides, height=sides, spacing=spacings)
-def test_discs_fit_into_the_block_and_share_all_four_faces(width: float, height: float, spacing: float) -> None:
-    world = build_world(dense([{"y": 0.5, "width": width, "height": height}], "particles", spacing))
-    particles = particles_of(world, 0)
-    inner = (width - spacing, height - spacing)
-    beyond = np.maximum(np.abs(particles.x) - inner[0] / 2, np.abs(particles.y) - inner[1] / 2)
-    assert beyond == pytest.approx(0.0, abs=1e-15)
-    assert particles.length.sum() == pytest.approx(2.0 * sum(inner), rel=1e-12)
-    assert particles.share.sum() == pytest.approx(4.0, rel=1e-12)
-    assert len(set(zip(particles.x.tolist(), particles.y.tolist(), strict=True))) == particles.size
-    assert particles.size == 2 * sum(division(side, spacing) for side in inner)
-    ring = np.stack([particles.x, particles.y], axis=1)
-    assert np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).max() <= spacing * (1.0 + 1e-9)
 
 
 TRIANGLE = [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]]

@@ -22,7 +22,6 @@ from blocksim.world.build import (
     build_world,
     cell_radius,
     with_more_room,
-    with_threads,
 )
 from blocksim.world.memory import SceneTooLargeError
 
@@ -69,14 +68,6 @@ def test_more_room_keeps_what_there_is() -> None:
 def test_every_group_of_bodies_has_a_tally_of_its_own(more: int) -> None:
     world = build_world(scenario(None, *({**BODY, "x": 0.1 * i} for i in range(2, 2 + more))))
     assert world.ledger.size > (world.bodies.size - 1) // GROUP
-
-
-@pytest.mark.parametrize("threads", [1, 2, 5])
-def test_threads_have_a_share_each_and_as_much_room_between_them_as_there_is_for_pairs(threads: int) -> None:
-    world = with_threads(build_world(scenario()), threads)
-    for roomy in (world, with_more_room(world)):
-        assert roomy.shares.size == threads
-        assert roomy.between.size == (1 if threads == 1 else roomy.pairs.size)
 
 
 def test_more_room_than_there_is_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

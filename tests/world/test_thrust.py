@@ -12,7 +12,7 @@ from blocksim.scenario import Scenario, load_scenario, place_bodies, place_segme
 from blocksim.simulation.rest_state import SettleError, settle
 from blocksim.simulation.run import simulate
 from blocksim.simulation.schemes import ALONE, build, build_scene
-from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
+from blocksim.verification.scene import HEIGHT, CaseScene, Simulation, scenario_of
 from blocksim.world.bodies import layout_of
 from blocksim.world.describe import describe
 from blocksim.world.joints import ContactJoint, joints_of
@@ -158,22 +158,6 @@ def test_joints_are_those_that_were_read(golden: Golden) -> None:
     golden("\n".join(texts))
 
 
-def stack(count: int, **time: Any) -> CaseScene:
-    bodies = [{"y": (i + 0.5) * HEIGHT} for i in range(count)]
-    rigid = {"scheme": "nonsmooth", "step": 1e-3, "velocity_tolerance": 1e-6, "end": 10.0, **time}
-    return CaseScene(bodies, restitution=0.0, time=rigid)
-
-
-@pytest.mark.parametrize(("count", "substeps"), [(5, 1), (5, 4)])
-def test_column_sinks_by_what_is_reported(count: int, substeps: int) -> None:
-    scene = stack(count, substeps=substeps)
-    told = describe(scene.scenario()).rigid
-    run = scene.start().to_time(2.0)
-    assert told is not None
-    assert (told.block, told.warning) == (str(count), "")
-    assert (count - 0.5) * HEIGHT - run.bodies.y[-1] == pytest.approx(told.sag, rel=1e-3)
-
-
 def heavy_on_light(ratio: float, *, x: float = 0.0, gap: float = 0.0, **time: Any) -> Scenario:
     """Return a block on another that has a share of its mass, beside its middle by x (m) and above it by a gap (m)."""
     materials = {
@@ -243,18 +227,6 @@ def test_a_run_warns_of_a_heavy_block_that_has_come_to_lie_on_a_light_one(ratio:
     result = simulate(scenario)
     assert result.status == "finished"
     assert ["a light block carries a heavy one" in text for text in result.summary.warnings] == [True] * is_warned
-
-
-def test_brick_carries_half_of_each_that_stands_on_two() -> None:
-    """A course of two on one of three: the middle one below has both halves and its own weight."""
-    below = [{"x": i * WIDTH, "y": HEIGHT / 2} for i in (-1, 0, 1)]
-    above = [{"x": i * WIDTH, "y": 1.5 * HEIGHT} for i in (-0.5, 0.5)]
-    placed = place_bodies(CaseScene([*below, *above]).scenario())
-    on_ground: dict[str, float] = {}
-    for load in loads_at_rest(placed, 1.0 / placed[0].mass):
-        if load.lower is None:
-            on_ground[placed[load.upper].name] = on_ground.get(placed[load.upper].name, 0.0) + load.force
-    assert on_ground == pytest.approx({"1": 1.5, "2": 2.0, "3": 1.5})
 
 
 def test_a_block_so_far_away_that_its_corners_are_one_place_halves_its_load() -> None:

@@ -17,7 +17,7 @@ from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.simulation import Result
 from blocksim.simulation.instruments import MOTION, Frame, Recorder
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.simulation.stores.hdf5 import SUPERBLOCK, FrameFile, is_left_open, lookup3, read_frames
+from blocksim.simulation.stores.hdf5 import FrameFile, is_left_open, read_frames
 from blocksim.simulation.trajectory import CONTACT_ROW, Rows
 from blocksim.verification.scene import scenario_of
 from tests.golden import Golden
@@ -289,15 +289,6 @@ def test_an_external_link_is_not_even_opened(refusal: Callable[[Change], str], t
     finally:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, alarm)
-
-
-def test_checksums_are_those_that_hdf5_writes(tmp_path: Path) -> None:
-    for number in range(20):
-        path = tmp_path / f"{number}.h5"
-        with h5py.File(path, "w", libver="latest") as file:
-            file["x"] = np.ones(100 * number)
-        head = path.read_bytes()[: SUPERBLOCK.size]
-        assert lookup3(head[:-4]) == int.from_bytes(head[-4:], "little")
 
 
 def test_a_file_that_was_not_closed_gives_all_committed_frames(files: Path, two_blocks: Scenario) -> None:
