@@ -3,24 +3,19 @@
 Blocks are the paper's: 32 x 25 x 50 mm, the height upright, unless a test says otherwise. SI units.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import pytest
 from hypothesis.internal.conjecture import providers
 
+from blocksim.kernels.common.arrays import World
 from blocksim.scenario import load_scenario
 from blocksim.verification.scene import CaseScene, PaperBlock, Simulation
 from blocksim.world.build import build_world
 from tests import site
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from blocksim.kernels.common.arrays import World
 
 __all__ = ["PaperBlock", "Simulation"]  # defined elsewhere, used by all tests
 

@@ -10,19 +10,15 @@ A test only ever compares. It fails where its section is missing, where it did n
 first of a file, where there are sections of no test. `make golden` writes what all tests print; read its difference.
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections import defaultdict
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import pytest
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 
 ROOT = Path(__file__).parents[1]
 HEAD = "=== "

@@ -1,4 +1,4 @@
-"""What a script or a notebook gets from `import blocksim`."""
+"""What a script or a notebook gets from `import blocksim`, and the exit code of each sort of error."""
 
 import doctest
 import inspect
@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import blocksim
+from blocksim import errors
 from blocksim.cli.commands import load_command
 from blocksim.errors import InvalidInputError, ScenarioError
 from blocksim.options import option_fields
@@ -180,3 +181,25 @@ def test_pictures_animations_and_reports_are_made_of_results(tmp_path: Path, mon
 def test_picture_of_a_result_that_was_not_kept_says_what_to_do(slide: Result) -> None:
     with pytest.raises(InvalidInputError, match="run it with out=FOLDER"):
         blocksim.plot(slide)
+
+
+CODES = {
+    errors.BlocksimError: 70,
+    errors.InvalidInputError: 65,
+    errors.ScenarioError: 65,
+    errors.InputMissingError: 66,
+    errors.UnavailableError: 69,
+    errors.OutputExistsError: 73,
+    errors.OutputError: 74,
+    errors.StoppedEarlyError: 75,
+}
+
+
+@pytest.mark.parametrize(("error", "code"), CODES.items(), ids=lambda one: getattr(one, "__name__", one))
+def test_every_sort_of_error_has_its_exit_code(error: type[errors.BlocksimError], code: int) -> None:
+    assert error.exit_code == code
+
+
+def test_no_sort_of_error_is_forgotten_here() -> None:
+    here = {one for one in vars(errors).values() if isinstance(one, type) and issubclass(one, errors.BlocksimError)}
+    assert here == set(CODES)

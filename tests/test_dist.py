@@ -11,8 +11,15 @@ from tests import dist
 def test_wheel_and_sdist_are_the_same_bytes_twice_and_bring_templates_and_scenarios(tmp_path: Path) -> None:
     made = dist.build_all(tmp_path)
     assert [path.name.partition("-")[0] for path in made] == ["blocksim", "blocksim"]
+    licence = (dist.ROOT / "blocksim" / "LICENSE").read_text()
+    assert licence.startswith("MIT License\n\nCopyright (c) 2026 The blocksim authors\n")
     with zipfile.ZipFile(made[1]) as packed:
         names = packed.namelist()
+        (metadata,) = (packed.read(name).decode() for name in names if name.endswith(".dist-info/METADATA"))
+        kept = [packed.read(name).decode() for name in names if name.endswith("/LICENSE")]
+    assert "\nLicense-File: blocksim/LICENSE\n" in metadata
+    assert "\nLicense-Expression: MIT\n" in metadata
+    assert set(kept) == {licence}
     for needed in (
         "templates/three-blocks.toml",
         "scenarios/three_blocks.toml",

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import typer
 
+from blocksim import __version__
 from blocksim.cli.commands import app
 from blocksim.scenario import Document
 from blocksim.scenario.key_table import BEGIN, END, key_table, with_part
@@ -123,3 +124,18 @@ def test_the_python_example_runs_as_a_script(
     out, err = capfd.readouterr()
     assert err == ""
     assert "[3 rows x" in out
+
+
+CHANGELOG = (Path(__file__).parents[1] / "blocksim" / "CHANGELOG.md").read_text(encoding="utf-8")
+VERSIONS = re.findall(r"^## (\S+)", CHANGELOG, flags=re.MULTILINE)
+LANDINGS = re.split(r"^### ", CHANGELOG, flags=re.MULTILINE)[1:]
+
+
+def test_this_version_has_a_section() -> None:
+    assert __version__ in VERSIONS
+    assert VERSIONS[0] in {"Unreleased", __version__}
+
+
+@pytest.mark.parametrize("landing", LANDINGS, ids=lambda text: text.splitlines()[0])
+def test_every_landing_says_whether_results_change(landing: str) -> None:
+    assert re.search(r"^Results change: .*\*\*(yes|no)\b", landing, flags=re.MULTILINE)

@@ -1,12 +1,10 @@
 """Measurements at their quick sizes: scenes, runs from the same state, what they tell, the registry and the report."""
 
-from __future__ import annotations
-
 import itertools
 import json
+from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -34,11 +32,7 @@ from blocksim.bench.three_blocks import CLOSE, SETTINGS, Solution, converged_lev
 from blocksim.errors import ExitCode
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.scenario.models.timeline import Nonsmooth
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.golden import Golden
+from tests.golden import Golden
 
 NOMINAL = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
 SOFT = {"stiffness_scale": 1e-4}

@@ -2,12 +2,9 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+from playwright.sync_api import Browser
 
 pytestmark = pytest.mark.long
 SIZES = {"desktop": {"width": 1280, "height": 850}, "phone": {"width": 390, "height": 800}}

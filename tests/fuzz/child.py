@@ -1,7 +1,5 @@
 """Commands in a process of their own: it may hang, crash or take all memory, and the tests can tell."""
 
-from __future__ import annotations
-
 import gc
 import json
 import os

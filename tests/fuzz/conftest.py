@@ -1,11 +1,10 @@
 """Commands in a child process, and how much of what comes in is tried."""
 
-from __future__ import annotations
-
 import re
 import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -13,9 +12,6 @@ from hypothesis import given, settings, strategies as st
 from tests.fuzz.child import MOST_BYTES, MOST_SECONDS, Child, Left
 from tests.fuzz.runs import Run, finished_run
 from tests.sizes import in_all
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 ROOT = Path(__file__).parents[2]
 T = TypeVar("T")

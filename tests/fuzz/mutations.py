@@ -1,17 +1,13 @@
 """Damage to texts and files, drawn at random: small enough that most of the file stays what it was."""
 
-from __future__ import annotations
-
 import copy
 import re
 import tomllib
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import tomli_w
 from hypothesis import strategies as st
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
 
 HOSTILE = (
     *("nan", "inf", "-inf", "1e308", "-1e308", "1e-308", "5e-324", "-0", "-0.0", "0", "-1", "0.5", "1e400", "00", "+1"),

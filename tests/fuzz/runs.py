@@ -1,10 +1,9 @@
 """A run whose results are damaged: as it finished, as a kill leaves it, and as a stranger may have written it."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -12,11 +11,7 @@ import numpy as np
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.simulation.instruments import Frame, Recorder
 from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.fuzz.child import Child
+from tests.fuzz.child import Child
 
 FRAMES = ("run.h5", "killed.h5", "old.h5")
 SOFT = ("--set", "contact.stiffness_scale=0.001", "--set", "time.end=0.05")

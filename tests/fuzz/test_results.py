@@ -1,19 +1,12 @@
 """Results that are damaged or made by a stranger: told in a line, drawn as far as they can be, and nothing worse."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 from hypothesis import strategies as st
 
+from tests.fuzz.child import Child
 from tests.fuzz.conftest import assert_harmless, search, tries
 from tests.fuzz.mutations import BINARY, JSON, SCENARIO, TABLE, damaged
-from tests.fuzz.runs import FRAMES
-
-if TYPE_CHECKING:
-    from tests.fuzz.child import Child
-    from tests.fuzz.runs import Run
+from tests.fuzz.runs import FRAMES, Run
 
 WAYS = {**dict.fromkeys(FRAMES, BINARY), "run.json": JSON, "final.csv": TABLE, "scenario.toml": SCENARIO}
 COMMANDS = (

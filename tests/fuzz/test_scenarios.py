@@ -1,26 +1,20 @@
 """Scenarios that are damaged, hostile or odd: refused with the place, or sound; never a traceback, a hang or a NaN."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
 import shutil
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 import tomli_w
 from hypothesis import strategies as st
 
+from tests.fuzz.child import Child
 from tests.fuzz.conftest import ROOT, assert_harmless, check_damaged, search, tries
 from tests.fuzz.mutations import SCENARIO, damaged, removals
 from tests.sizes import in_all
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.fuzz.child import Child
-
 
 WITH_SOIL = tuple(path.read_bytes() for path in sorted((ROOT / "scenarios" / "soil").glob("*.toml")))
 TEXTS = tuple(path.read_bytes() for path in sorted((ROOT / "scenarios").glob("*.toml")))

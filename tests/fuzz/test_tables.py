@@ -1,23 +1,16 @@
 """Tables that are damaged or hostile: of experiments, of a support's motion, of cases and of the results of sweeps."""
 
-from __future__ import annotations
-
 import re
 import shutil
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from hypothesis import strategies as st
 
+from tests.fuzz.child import Child
 from tests.fuzz.conftest import ROOT, assert_harmless, search, tries
 from tests.fuzz.mutations import TABLE, damaged
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.fuzz.child import Child
-    from tests.fuzz.runs import Run
-
+from tests.fuzz.runs import Run
 
 EXPERIMENT = (ROOT / "scenarios" / "experiments" / "three_blocks.csv").read_bytes()
 MOTION = b"# a pulse\ntime_s,acceleration_g\n0.00,0\n0.01,0.12\n0.02,-0.3\n0.03,0.05\n0.04,0\n"

@@ -1,22 +1,17 @@
 """Figures in words, for golden files: what is written, how far axes reach, where lines and areas are."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import Collection, LineCollection
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.text import Text
 
 from tests.view.made_up import texts_in
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Patch
-    from matplotlib.text import Text
 
 CORNERS = 12  # of areas, and ends of lines, that are told one by one
 MOST = 6  # lines and colours that are told one by one

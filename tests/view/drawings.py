@@ -1,11 +1,10 @@
 """Every kind of picture, drawn from made-up data: (path, paper) of each by name."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from blocksim.scenario.geometry import regular
 from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure, Stretch
 from blocksim.scenario.motion import MotionPieces
 from blocksim.scenario.open_faces import NO_FACE
+from blocksim.simulation.trajectory import Frames
 from blocksim.view import style
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
@@ -24,19 +24,14 @@ from blocksim.view.run_data import LoadOverTime, Support, support_of
 from blocksim.view.scene import PictureOptions
 from blocksim.view.strip import draw_strip
 from blocksim.view.studies import Bars, LevelPanel, draw_levels, draw_tornado
+from blocksim.view.style import Paper
+from blocksim.view.sweeps.data import SweepData
 from blocksim.view.sweeps.lines import Series, draw_series
 from tests.bench.peers.work_precision import Curve, Panel as Work, draw_work_precision
 from tests.view.made_up import HOSTILE, blocks_at, polygons, pressed, stacked, toppling
 from tests.view.made_up_sweeps import grid, made_up, samples
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from blocksim.simulation.trajectory import Frames
-    from blocksim.view.style import Paper
-    from blocksim.view.sweeps.data import SweepData
-
-    Drawing = Callable[[Path, Paper], None]
+Drawing = Callable[[Path, Paper], None]
 
 TABLE = load_table(Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv").summaries()
 RUN = PictureOptions("a run", TABLE)

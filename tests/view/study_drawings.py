@@ -1,9 +1,8 @@
 """Pictures of studies, probes and motions, drawn from made-up data: (path, paper) of each by name."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,13 +29,8 @@ from blocksim.view.style import Paper
 from blocksim.view.sweeps.data import Input
 from blocksim.view.time_panels import draw_probes, draw_support_motion
 from tests.scenario.test_motion import END, scenario
-from tests.view.drawings import KEYS, panel
+from tests.view.drawings import KEYS, Drawing, panel
 from tests.view.made_up_sweeps import grid, made_up
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.view.drawings import Drawing
 
 OTHERS = (
     OtherLimits("curve of a book", tuple((0.1 * number, 2.0 - 0.1 * number) for number in range(13))),

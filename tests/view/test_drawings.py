@@ -1,25 +1,23 @@
 """What is true of every picture: what it shows, nothing covered or cut, its page, its bytes, and clear refusals."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
 
 from blocksim.errors import InvalidInputError
+from blocksim.view import style
 from blocksim.view.style import OWN, Paper
+from tests.golden import Golden
 from tests.view.described import described
 from tests.view.drawings import DRAWINGS
 from tests.view.made_up import overlapping
 from tests.view.study_drawings import STUDIES
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tests.golden import Golden
 
 ALL = DRAWINGS | STUDIES
 KINDS = ("strip", "final", "history", "levels", "work", "tornado", "series", "lines", "map", "matrix", "histogram")
@@ -89,3 +87,50 @@ def test_page_that_is_too_small_is_refused_before_anything_is_drawn(caught: list
 def test_odd_names_can_be_written(tmp_path: Path, suffix: str) -> None:
     DRAWINGS["final with odd names"](tmp_path / f"final.{suffix}", OWN)
     assert (tmp_path / f"final.{suffix}").stat().st_size > 1000
+
+
+REFERENCES = Path(__file__).parent / "references"
+DOTS_PER_INCH = 100
+COLOURS = 64
+LARGEST_RMS = 3.0  # of 255
+FAR_OFF, MOST_FAR_OFF = 32, 0.01  # a pixel is far off from here on; share of pixels that may be
+DRAWN = {
+    "strip": "strip with forces",
+    "final": "final",
+    "history": "history of impacts",
+    "map": "map",
+    "tornado": "tornado",
+}
+
+
+def pixels(path: Path) -> NDArray[np.float64]:
+    with Image.open(path) as picture:
+        return np.asarray(picture.convert("RGB"), dtype=np.float64)
+
+
+def shrink(path: Path) -> None:
+    """Write a picture again with few colours, as references have."""
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
+
+
+def differ(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Return True if two pictures are not the same to the eye."""
+    if one.shape != other.shape:
+        return True
+    off = np.abs(one - other)
+    return bool(np.sqrt((off**2).mean()) > LARGEST_RMS or (off.max(axis=-1) > FAR_OFF).mean() > MOST_FAR_OFF)
+
+
+@pytest.mark.skipif(mpl.__version_info__ < (3, 11), reason="drawn with texts as matplotlib sets them from 3.11 on")
+@pytest.mark.parametrize("name", DRAWN)
+def test_picture_looks_like_its_reference(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(style.SETTINGS, "savefig.dpi", DOTS_PER_INCH)
+    new, reference = REFERENCES / f"{name}.new.png", REFERENCES / f"{name}.png"
+    DRAWINGS[DRAWN[name]](new, OWN)
+    drawn = pixels(new)
+    shrink(new)
+    assert reference.is_file(), f"no reference yet: look at {new}"
+    assert not differ(drawn, pixels(reference)), f"looks different: {new}"
+    new.unlink()

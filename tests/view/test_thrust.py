@@ -1,19 +1,24 @@
-"""Forces in the joints of a run, and their picture."""
+"""Forces in the joints of a run and mechanisms: which joints press, slide and rock, and their pictures."""
 
-from __future__ import annotations
+from pathlib import Path
+from typing import Any
 
-from typing import TYPE_CHECKING
-
+import numpy as np
 import pytest
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from blocksim import plot, replace, run
 from blocksim.errors import InvalidInputError
+from blocksim.scenario import load_scenario
+from blocksim.simulation.results import Result
+from blocksim.view.mechanism import SLIDES, BracketRun, draw_mechanisms, joints
+from blocksim.view.run_data import support_of
+from blocksim.view.scene import corners
+from blocksim.view.style import BLOCK_COLOURS, INK, MEASURED_COLOUR, Paper
 from blocksim.view.thrust import run_joints
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from blocksim.simulation.results import Result
+from tests.study.plans import SLENDER, SQUAT, block_on_a_slope
 
 STONE = {"density": 2000.0, "young_modulus": 1e10, "poisson_ratio": 0.2}
 WEIGHT = 2000.0 * 9.81 * 0.2 * 0.1  # N
@@ -60,3 +65,103 @@ def test_thrust_of_a_run_is_a_picture_and_needs_contacts(stack: Result, tmp_path
     bare = run(replace(stack.scenario, {"output.contacts": False}), out=tmp_path / "bare")
     with pytest.raises(InvalidInputError, match="has stored no contacts"):
         plot(bare, kind="thrust", out=tmp_path / "none.png")
+
+
+def side(size: tuple[float, float], tilt: str, *, contacts: bool = True, **tables: Any) -> BracketRun:
+    data: dict[str, Any] = block_on_a_slope(size) | {"ground": {"tilt": tilt}} | tables
+    scenario = load_scenario(data | {"output": {"every": 0.02, "contacts": contacts}})
+    result = run(scenario)
+    assert result.summary.movement is not None
+    moved = result.summary.movement.first_mover
+    return BracketRun(result.frames, support_of(scenario), moved, f"at {tilt}", is_mechanism=moved is not None)
+
+
+@pytest.fixture(scope="module")
+def sliding() -> BracketRun:
+    """Give a squat block that slides."""
+    return side(SQUAT, "25 deg")
+
+
+@pytest.fixture(scope="module")
+def toppling() -> BracketRun:
+    """Give a slender block that topples downhill, to -x."""
+    return side(SLENDER, "15 deg")
+
+
+def test_a_sliding_block_has_a_joint_that_slides_and_does_not_rock(sliding: BracketRun) -> None:
+    (joint,) = joints(sliding.frames, sliding.frame, sliding.support)
+    assert joint.slides
+    assert not len(joint.hinges)
+
+
+def test_a_toppling_block_rocks_about_its_lower_edge(toppling: BracketRun) -> None:
+    (joint,) = joints(toppling.frames, toppling.frame, toppling.support)
+    assert not joint.slides
+    assert joint.hinges == pytest.approx(np.array([[-0.5 * SLENDER[0], 0.0]]), abs=1e-4)
+
+
+def test_an_arch_placed_without_force_has_its_four_hinges() -> None:
+    # Voussoirs on springs touch at the beginning where round-off makes them: at three of eight joints.
+    changes = {
+        "ground.tilt": "23 deg",  # limit analysis: it falls from 20.49 deg on
+        "time": {"scheme": "explicit", "end": 1.6},
+        "output": {"every": 0.02, "contacts": True},
+    }
+    scenario = load_scenario("scenarios/tilting_arch.toml", changes)
+    frames = run(scenario).frames
+    fallen = BracketRun(frames, support_of(scenario), "2", "", is_mechanism=True)
+    found = joints(frames, fallen.frame, fallen.support)
+    assert not any(joint.slides for joint in found)
+    hinges = sorted(np.concatenate([joint.hinges for joint in found]).tolist())
+    now, then = (1e-3 * np.concatenate(corners(frames, at)[:7]) for at in (fallen.frame, 0))  # of all voussoirs
+    nearest = [int(np.argmin(np.hypot(*(now - hinge).T))) for hinge in hinges]
+    assert np.array(hinges) == pytest.approx(now[nearest], abs=0.01)
+    spring = then[np.argsort(then[:, 1])[:2]]  # the lower corners, of the intrados
+    centre = [spring[:, 0].mean(), spring[0, 1] - 9.25 * np.sin(np.radians(11.25))]
+    inner, outer = 9.25, 10.75
+    assert np.hypot(*(then[nearest] - centre).T) == pytest.approx([outer, inner, outer, inner], abs=0.01)
+
+
+def test_a_mechanism_is_drawn_when_it_is_first_seen_and_not_as_a_heap(toppling: BracketRun) -> None:
+    way = np.hypot(toppling.frames.x - toppling.frames.x[0], toppling.frames.y - toppling.frames.y[0])[:, 0]
+    assert way[toppling.frame - 1] <= 0.3 * SLENDER[0] < way[toppling.frame]
+    assert toppling.frame < len(way) - 1
+
+
+def test_the_picture_is_the_same_every_time_and_says_what_each_side_is(
+    toppling: BracketRun, sliding: BracketRun, tmp_path: Path
+) -> None:
+    for name in ("one", "two"):
+        draw_mechanisms([(sliding, toppling), (toppling, sliding)], tmp_path / f"{name}.svg", "Both")
+    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
+    with pytest.raises(InvalidInputError, match="too small for this picture"):
+        draw_mechanisms([(sliding, toppling)], tmp_path / "small.png", paper=Paper((5.0, 1.0)))
+    bare = side(SQUAT, "25 deg", contacts=False)
+    with pytest.raises(InvalidInputError, match=r"output\.contacts=true"):
+        draw_mechanisms([(bare, toppling)], tmp_path / "bare.png")
+
+
+def test_no_line_but_a_sliding_joint_reads_as_one_and_the_legend_has_its_colour(
+    sliding: BracketRun, toppling: BracketRun, caught: list[Figure]
+) -> None:
+    draw_mechanisms([(toppling, sliding)], "marks.png")
+    (figure,) = caught
+    panels = [axes for axes in figure.axes if any(isinstance(one, PolyCollection) for one in axes.collections)]
+    assert len(panels) == 2
+    lines = [one for axes in panels for one in axes.collections if isinstance(one, LineCollection)]
+    above_ground = [line for one in lines for line in one.get_segments() if (np.asarray(line)[:, 1] > 0.0).any()]
+    assert above_ground == []  # marks of top faces would lie on joints of voussoirs
+    colours = [{line.get_color() for line in axes.lines if line.get_marker() == "D"} for axes in panels]
+    assert colours == [set(), {SLIDES}]
+    (legend,) = figure.legends
+    named = {text.get_text(): handle for text, handle in zip(legend.texts, legend.legend_handles, strict=True)}
+    assert list(named) == ["first block to move", "sliding joint", "hinge"]
+    assert isinstance(named["sliding joint"], Line2D)
+    assert named["sliding joint"].get_color() == SLIDES
+    assert SLIDES not in {*BLOCK_COLOURS, MEASURED_COLOUR, INK}
+
+
+def test_a_block_that_stands_has_no_such_joint() -> None:
+    still = side(SQUAT, "5 deg")
+    assert joints(still.frames, still.frame, still.support) == []
+    assert still.frame == len(still.frames.time) - 1

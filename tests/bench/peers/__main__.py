@@ -3,13 +3,11 @@
 Box2D 2.3 is a package; version 3 takes part where the environment variable BOX2D_V3 holds the path of a library of it.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from blocksim.bench.harness import REPEATS, BenchmarkRun, Effort, machine_lines, report, this_machine
 from blocksim.bench.registry import choose
@@ -20,9 +18,6 @@ from tests.bench.peers.engine import Readings
 from tests.bench.peers.heap import HEAP
 from tests.bench.peers.three_blocks import PAPER, WITHOUT_RESTITUTION
 from tests.bench.peers.work_precision import draw_work_precision
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 PEERS = (PAPER, WITHOUT_RESTITUTION, BRICKS, HEAP)
 PACKAGES = {"pymunk": "pymunk", "Box2D": "box2d"}  # module: name of its package

@@ -1,21 +1,15 @@
 """Box2D v3, where a shared library of it is at hand: `BOX2D_V3` holds its path. Data structures are those of 3.1."""
 
-from __future__ import annotations
-
 import ctypes
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from blocksim.bench.harness import FRICTION
-from tests.bench.peers.engine import GRAVITY, GROUND_DEPTH, GROUND_LENGTH, UNITS, Stepper
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from blocksim.scenario import PlacedBody
-    from tests.bench.peers.engine import Scene
+from blocksim.scenario import PlacedBody
+from tests.bench.peers.engine import GRAVITY, GROUND_DEPTH, GROUND_LENGTH, UNITS, Scene, Stepper
 
 VARIABLE = "BOX2D_V3"
 VERSION = (3, 1)  # of the structures below

@@ -6,11 +6,10 @@ accuracy every engine takes the longest step with which it is as near to its own
 is to its own at steps of 1 ms in 4 substeps.
 """
 
-from __future__ import annotations
-
 import functools
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,13 +25,8 @@ from blocksim.bench.harness import (
     single,
 )
 from tests.bench.peers import box2d_v3
-from tests.bench.peers.engine import Box2D, Nonsmooth, Pymunk, Scene, raced
+from tests.bench.peers.engine import Box2D, Final, Nonsmooth, Pymunk, Scene, Solver, raced
 from tests.bench.peers.series import BOX2D, BOX2D_V3, NONSMOOTH, PYMUNK, RACE_STEP
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from tests.bench.peers.engine import Final, Solver
 
 
 class Size(NamedTuple):

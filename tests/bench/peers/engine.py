@@ -1,29 +1,23 @@
 """The engines: a scene, its result, the timed loop over steps; pymunk, Box2D, and blocksim with either scheme."""
 
-from __future__ import annotations
-
 import math
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.bench import harness
-from blocksim.bench.harness import FRICTION, Number, Rerun
+from blocksim.bench.harness import FRICTION, Number, Rerun, TimeSteps
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.geometry import edges_of
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import ALONE
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from blocksim.bench.harness import TimeSteps
-    from tests.bench.peers.work_precision import Panel
+from tests.bench.peers.work_precision import Panel
 
 Floats = NDArray[np.float64]
 CALLS = 20_000  # that are timed on an empty scene

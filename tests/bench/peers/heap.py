@@ -5,11 +5,11 @@ are compared by the distributions of their final positions, that of x and that o
 curves (Wasserstein-1 distance): the mean distance of the sorted positions.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.bench.harness import (
     FRICTION,
@@ -21,15 +21,9 @@ from blocksim.bench.harness import (
     Table,
     one_structure,
 )
+from blocksim.scenario import Scenario
 from tests.bench.peers.engine import Final, Scene, raced
 from tests.bench.peers.series import heap_racers
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from numpy.typing import NDArray
-
-    from blocksim.scenario import Scenario
 
 ROUNDS = 3  # of engines in turns, at most
 HEXAGONS, HEXAGONS_GAP = (0.02, 0.04), 0.002  # m, smallest and largest of a heap, and the least distance at the start

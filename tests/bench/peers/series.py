@@ -1,15 +1,8 @@
 """Settings of the engines that are compared: one line per curve."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from blocksim.bench.harness import UNTIL_SOLVED, TimeSteps
 from tests.bench.peers.box2d_v3 import STIFF, Box2Dv3, library
-from tests.bench.peers.engine import Box2D, Explicit, Nonsmooth, Pymunk, Series
-
-if TYPE_CHECKING:
-    from tests.bench.peers.engine import Solver
+from tests.bench.peers.engine import Box2D, Explicit, Nonsmooth, Pymunk, Series, Solver
 
 PYMUNK, BOX2D, BOX2D_V3, EXPLICIT, NONSMOOTH = "pymunk", "Box2D", "Box2D v3", "explicit", "non-smooth"
 STEPS = (4e-3, 2.8e-3, 2e-3, 1.4e-3, 1e-3, 7e-4, 5e-4, 2e-4, 1e-4, 5e-5)  # s

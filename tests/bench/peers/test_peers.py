@@ -1,11 +1,9 @@
 """Other engines on the same scenes, those that are installed, and the picture of accuracy against computing time."""
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,9 +17,6 @@ from tests.bench.peers.engine import Box2D, Explicit, Final, Nonsmooth, Pymunk, 
 from tests.bench.peers.heap import HEAP, wasserstein
 from tests.bench.peers.three_blocks import starts
 from tests.bench.peers.work_precision import SMALLEST_SHARE, Curve, Panel, draw_work_precision, floor_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 # of the wrapper of Box2D
 pytestmark = pytest.mark.filterwarnings("ignore:builtin type .* has no __module__ attribute:DeprecationWarning")

@@ -1,15 +1,14 @@
 """The three blocks by all engines: distance from the engine's own converged answer, and the CPU time it takes."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.bench.harness import RESTITUTION, Benchmark, Effort, Number, Table, TimeSteps, single, three_blocks
+from blocksim.scenario import Scenario
 from blocksim.scenario.structures.base import draws
 from tests.bench.peers.box2d_v3 import Box2Dv3, library
 from tests.bench.peers.engine import (
@@ -27,11 +26,6 @@ from tests.bench.peers.engine import (
 )
 from tests.bench.peers.series import BOX2D, BOX2D_V3, NONSMOOTH, PYMUNK, three_blocks_series
 from tests.bench.peers.work_precision import Curve, Panel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from blocksim.scenario import Scenario
 
 STARTS, QUICK_STARTS = 16, 2
 JITTER = 1e-6  # m

@@ -4,18 +4,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from blocksim.view import style
 from blocksim.view.run_data import Floats
 from blocksim.view.style import OWN, Paper
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PANEL, LEAST = (3.6, 2.9), (1.9, 0.9)  # inches, of a panel, and on a page whose size was asked for
 LEFT, RIGHT, HEAD, FOOT, GAP = 0.62, 0.15, 0.32, 0.40, 0.72  # inches
