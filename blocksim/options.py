@@ -65,6 +65,20 @@ Overwrite = Annotated[bool, Option("Run again and replace the existing results."
 Replace = Annotated[bool, Option("Replace a file that blocksim did not write.")]
 
 
+class _Silent:
+    """The default of everything that is called with news of a run or a study: nothing happens."""
+
+    def __call__(self, *news: object) -> None:
+        """Do nothing."""
+
+    def __repr__(self) -> str:
+        """Return the name by which signatures in `help` show it."""
+        return "silent"
+
+
+silent = _Silent()
+
+
 class OptionField(NamedTuple):
     """A field of a dataclass of options; `kind` is its type, without what says that it is an option."""
 

@@ -6,8 +6,7 @@ from typing import Annotated
 
 from blocksim.cli import command_line, output, progress
 from blocksim.errors import InvalidInputError, OutputExistsError
-from blocksim.options import Option, Replace
-from blocksim.silence import silent
+from blocksim.options import Option, Replace, silent
 from blocksim.simulation import files
 from blocksim.simulation.stores.exports import FORMATS
 from blocksim.study import compare, pictures, report, run_folder

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from blocksim.cli.output import note
 from blocksim.errors import StoppedEarlyError
-from blocksim.silence import silent
+from blocksim.options import silent
 
 if TYPE_CHECKING:  # stored results are shown without the solver
     from rich.progress import Progress

@@ -15,7 +15,7 @@ from blocksim.scenario.models.base import HELD, SYSTEMS
 from blocksim.scenario.overrides import options, si_unit
 from blocksim.scenario.structures import KINDS
 from blocksim.scenario.structures.base import Structure
-from blocksim.scenario.structures.openings import Opening
+from blocksim.scenario.structures.masonry import Opening
 
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"

@@ -13,9 +13,9 @@ import numpy as np
 
 from blocksim.errors import OutputError
 from blocksim.kernels.common import arrays, compiler
+from blocksim.options import silent
 from blocksim.scenario import PlacedBody, Scenario, events, motion, placement, scenario_hash
 from blocksim.scenario.models.motion import Pulse
-from blocksim.silence import silent
 from blocksim.simulation import balance, checkpoint, files, instruments, loop, observables, provenance, results, schemes
 from blocksim.simulation.interruption import WallTime, stop_requests
 from blocksim.simulation.rest_state import initial_scene

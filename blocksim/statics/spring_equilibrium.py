@@ -30,7 +30,7 @@ from scipy.sparse.linalg import splu
 
 from blocksim.kernels.common import tolerances
 from blocksim.kernels.common.arrays import REACHED, World
-from blocksim.world.contact_places import places_of
+from blocksim.world.joints import places_of
 
 BALANCE = 1e-8  # of gravity and loads: unrest at rest
 ROUND_OFF = 4.0  # of the last digit of a place, by which springs are always out of balance

@@ -18,10 +18,9 @@ from blocksim.analysis.compare import interval
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, OutputError, OutputExistsError, Problem, ScenarioError
 from blocksim.extras import load_module
-from blocksim.options import Option
+from blocksim.options import Option, silent
 from blocksim.scenario import Document, Scenario, Sweep, input_files, overrides, scenario_hash, units
 from blocksim.scenario.models.study import Normal, Uniform, toml_number
-from blocksim.silence import silent
 from blocksim.simulation import files, provenance
 from blocksim.study import compare, plan as plans
 from blocksim.study.executors.ensemble import Member

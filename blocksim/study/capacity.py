@@ -25,7 +25,7 @@ from blocksim.simulation.balance import solver_module
 from blocksim.simulation.instruments import ACTUATOR, ProbeSeries
 from blocksim.simulation.trajectory import Frames
 from blocksim.study import run_folder
-from blocksim.view import capacity as view, style
+from blocksim.view import style, time_panels as view
 
 if TYPE_CHECKING:
     import pandas as pd

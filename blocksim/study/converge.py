@@ -29,9 +29,8 @@ from numpy.typing import NDArray
 
 from blocksim.analysis.experiment import load_table
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
-from blocksim.options import Option, takes
+from blocksim.options import Option, silent, takes
 from blocksim.scenario import Scenario, Source, load_scenario, place_bodies, placement
-from blocksim.silence import silent
 from blocksim.simulation import files, interruption, provenance, results, schemes
 from blocksim.study import pictures
 from blocksim.study.answer import Overview, UnstoredResult

@@ -30,10 +30,9 @@ from blocksim.analysis.compare import interval
 from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit, inflation_of
 from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.extras import load_module
-from blocksim.options import Option, Overwrite, takes
+from blocksim.options import Option, Overwrite, silent, takes
 from blocksim.scenario import Document, Source, Sweep, document_of, overrides, scenario_hash
 from blocksim.scenario.models.study import Uniform, Variation
-from blocksim.silence import silent
 from blocksim.simulation import observables, provenance, schemes
 from blocksim.study import criterion, executors, limit_plan, manifest, plan as plans, rows, sweep, sweep_folder
 from blocksim.study.answer import Answer, Overview, Study, with_unit

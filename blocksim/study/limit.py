@@ -43,10 +43,9 @@ from pathlib import Path
 from typing import Any
 
 from blocksim.errors import InvalidInputError, OutputError, StoppedEarlyError
-from blocksim.options import takes
+from blocksim.options import silent, takes
 from blocksim.scenario import Document, Scenario, Source, document_of, laws, motion, place_bodies, placement
 from blocksim.scenario.models import motion as motions, timeline
-from blocksim.silence import silent
 from blocksim.simulation import observables, provenance, rest_state, schemes
 from blocksim.study import limit_answer, limit_plan, manifest, sweep, sweep_folder
 from blocksim.study.answer import Study, without_cases

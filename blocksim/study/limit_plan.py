@@ -24,11 +24,10 @@ from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.options import Option, Overwrite, takes
+from blocksim.options import Option, Overwrite, silent, takes
 from blocksim.scenario import Document, Scenario, overlap, overrides, place_bodies, place_segments, scenario_hash, units
 from blocksim.scenario.models import study, timeline
 from blocksim.scenario.placement import smallest_width
-from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
 from blocksim.statics.blockwork import why_not_sustained
 from blocksim.study import answer, criterion, executors, manifest

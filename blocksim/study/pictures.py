@@ -13,10 +13,9 @@ from blocksim.analysis.curves import load_curves
 from blocksim.analysis.evidence import Members
 from blocksim.analysis.experiment import ExperimentTable, has_curves, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
-from blocksim.options import Option, Replace, takes
+from blocksim.options import Option, Replace, silent, takes
 from blocksim.scenario import Scenario, input_files, load_scenario, load_stored, overrides, spelling, units
 from blocksim.scenario.models.study import Normal, Uniform, Variation
-from blocksim.silence import silent
 from blocksim.simulation import files
 from blocksim.study import answer, capacity, compare, manifest, run_folder, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, X, quarter_turns

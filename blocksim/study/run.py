@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
-from blocksim.options import Option, Overwrite, takes
+from blocksim.options import Option, Overwrite, silent, takes
 from blocksim.scenario import Scenario, Source, load_scenario
-from blocksim.silence import silent
 from blocksim.simulation import Result, Watcher, checkpoint, files, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation.results import RESULT_FILES, changed_files, read_summary
 from blocksim.simulation.run import NO_CALLBACKS, RunCallbacks

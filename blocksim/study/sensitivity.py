@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.extras import load_module
-from blocksim.options import Option, takes
+from blocksim.options import Option, silent, takes
 from blocksim.scenario import Scenario, Source, document_of
 from blocksim.scenario.models.study import Normal, Variation
-from blocksim.silence import silent
 from blocksim.simulation import schemes, trajectory
 from blocksim.study import pictures, plan as plans, rows
 from blocksim.study.answer import Overview, UnstoredResult

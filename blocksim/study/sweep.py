@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Annotated, Self, TypeVar
 
 from blocksim import errors
-from blocksim.options import Option, Overwrite, takes
+from blocksim.options import Option, Overwrite, silent, takes
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
-from blocksim.silence import silent
 from blocksim.simulation import files, interruption, provenance, schemes
 from blocksim.study import executors, manifest, plan as plans, rows, sweep_folder
 

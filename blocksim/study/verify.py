@@ -23,8 +23,8 @@ import numpy as np
 
 from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
+from blocksim.options import silent
 from blocksim.scenario import input_files, scenario_hash
-from blocksim.silence import silent
 from blocksim.simulation import Watcher, checkpoint, files, instruments, observables, provenance, results, simulate
 from blocksim.simulation.trajectory import csv_text
 from blocksim.study import answer, manifest, plan, run_folder, sweep, sweep_folder

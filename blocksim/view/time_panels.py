@@ -1,4 +1,7 @@
-"""Panels over one axis of time: named lines beside their names and notes; probes, and the motion of supports."""
+"""Panels over one axis of time: named lines beside their names and notes; probes, and the motion of supports.
+
+Capacity curves: force over displacement of actuators, with the bound of statics, before measured curves.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -297,4 +300,51 @@ def draw_support_motion(
     path = style.picture_path(path)
     notes = f"Ground, walls and fixed bodies, {support.way}. {left}"
     with open_time_panels(panels, title, notes, paper) as (figure, _):
+        style.save_figure(figure, path)
+
+
+KILO = 1e-3
+CURVES, LEAST_CURVES = (5.2, 3.3), (1.8, 1.0)  # inches, of the panel, and on a page whose size was asked for
+CURVE_SIDES = 0.70, 0.15, 0.11, 0.44  # inches
+MEASURED: dict[str, Any] = {"color": "#9E9E9E", "linewidth": 2.2, "alpha": 0.8}
+BOUND: dict[str, Any] = {"linewidth": 1.0, "linestyle": (0, (5, 2))}
+
+
+@dataclass(frozen=True, eq=False)
+class CapacityCurve:
+    """The n samples of one actuator, what statics allows in each direction in which it went, and what was measured."""
+
+    name: str
+    displacement: Floats  # (n,) m
+    force: Floats  # (n,) N
+    bounds: Sequence[float]  # N, negative of pulls; NaN where statics has none
+    measured: Sequence[tuple[Floats, Floats]]  # m, N of each repeat
+
+
+def draw_curves(curves: Sequence[CapacityCurve], path: Path | str, title: str, paper: style.Paper) -> None:
+    """Draw them into one panel and write PNG, SVG or PDF; the same input gives the same bytes.
+
+    Raises InvalidInputError for an unknown picture format or too small a page, OutputError.
+    """
+    path = style.picture_path(path)
+    with style.open_panels(paper, [1], CURVES, LEAST_CURVES, CURVE_SIDES, title=title) as (figure, ((axes,),)):
+        axes.spines[["right", "top"]].set_visible(False)
+        label = "measured"
+        for curve in curves:
+            for x, y in curve.measured:
+                axes.plot(MILLIMETRES * x, KILO * y, label=label, **MEASURED)
+                label = "_"
+        for number, curve in enumerate(curves):
+            colour = COLOURS[number % len(COLOURS)]
+            axes.plot(
+                MILLIMETRES * curve.displacement, KILO * curve.force, color=colour, linewidth=1.4, label=curve.name
+            )
+            for bound in (one for one in curve.bounds if np.isfinite(one)):
+                name = f"no equilibrium beyond {KILO * abs(bound):.4g} kN (statics)"
+                axes.axhline(KILO * bound, color=colour, label=name, **BOUND)
+        axes.axhline(0.0, color=style.INK, linewidth=0.6, zorder=0)
+        axes.set_xlabel("displacement (mm)")
+        axes.set_ylabel("force (kN)")
+        axes.margins(x=0.02, y=0.08)
+        axes.legend(loc="best", frameon=False)
         style.save_figure(figure, path)

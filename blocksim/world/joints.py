@@ -1,5 +1,7 @@
 """Joints: where free blocks touch others and supports as they are placed, and the forces that act on these blocks.
 
+Also where the contacts of a world with springs are, found again as kernels find them (`places_of`).
+
 Joints are found from the corners of bodies as they are placed. Outlines are convex, so that two bodies touch along one
 interval or at one point. The ends of an interval are corners of one of the two that lie on an edge of the other,
 whatever the shape: rectangles, outlines, drawn polygons, voussoirs, pieces of ground and walls, and the half-plane.
@@ -8,13 +10,14 @@ whatever the shape: rectangles, outlines, drawn polygons, voussoirs, pieces of g
 import math
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common import loads
-from blocksim.kernels.common.arrays import LOAD_ACTUATOR, LOAD_FIELD, LOAD_TILT, LOAD_WATER
+from blocksim.kernels.common.arrays import LOAD_ACTUATOR, LOAD_FIELD, LOAD_TILT, LOAD_WATER, World
+from blocksim.kernels.explicit import sides as shapes
 from blocksim.scenario import PlacedBody, PlacedSegment, geometry, placement
 from blocksim.world.bodies import Layout
 from blocksim.world.sag import TOUCHING
@@ -200,3 +203,35 @@ def applied_forces(layout: Layout, blocks: Sequence[int]) -> Floats:
     masses = np.array([layout.placed[i].mass for i in blocks])
     forces[:, :2] += np.outer(masses, push - gravity * np.array([math.sin(tilt), math.cos(tilt)]))
     return forces
+
+
+Indices = NDArray[np.intp]
+SIDES_X, SIDES_Y = (-1.0, 1.0, 1.0, -1.0), (-1.0, -1.0, 1.0, 1.0)  # of the corners, counter-clockwise from lower left
+
+
+def places_of(world: World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
+    """Return place (m) and normal of contacts (c,) between bodies a and b: x, y, and the normal from b to a.
+
+    Those of particles keep them.
+    """
+    if "nx" in (contacts.dtype.names or ()):
+        return [contacts[name] for name in ("x", "y", "nx", "ny")]
+    bodies = world.bodies.view(np.ndarray)
+    is_of_a = contacts["slot"] < shapes.MOST_CORNERS
+    owner, touched = np.where(is_of_a, a, b), np.where(is_of_a, b, a)
+    number, face = contacts["slot"] % shapes.MOST_CORNERS, contacts["face"]
+    cosine, sine = bodies["cos"][touched], bodies["sin"][touched]
+    if world.corners is None:
+        px = np.choose(number, SIDES_X) * bodies["half_x"][owner]
+        py = np.choose(number, SIDES_Y) * bodies["half_y"][owner]
+        # faces 0: -y, 1: +x, 2: +y, 3: -x
+        nx, ny = np.choose(face, [sine, cosine, -sine, -cosine]), np.choose(face, [-cosine, sine, cosine, -sine])
+    else:
+        corners = world.corners.view(np.ndarray)
+        corner, edge = bodies["first_corner"][owner] + number, bodies["first_corner"][touched] + face
+        px, py, nx, ny = corners["x"][corner], corners["y"][corner], corners["nx"][edge], corners["ny"][edge]
+        nx, ny = cosine * nx - sine * ny, sine * nx + cosine * ny
+    outward = np.where(is_of_a, 1.0, -1.0)  # from b to a, whichever of the two is touched
+    cosine, sine = bodies["cos"][owner], bodies["sin"][owner]
+    x, y = bodies["x"][owner] + cosine * px - sine * py, bodies["y"][owner] + sine * px + cosine * py
+    return [x, y, outward * nx, outward * ny]

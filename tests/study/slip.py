@@ -6,8 +6,8 @@ from typing import ClassVar
 
 from pydantic import BaseModel
 
+from blocksim.options import silent
 from blocksim.scenario import Document
-from blocksim.silence import silent
 from blocksim.study.answer import Answer, Overview, Study
 from blocksim.study.executors import Execution
 from blocksim.study.rows import Row

@@ -11,7 +11,7 @@ import pytest
 from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import REACHED, World
 from blocksim.scenario.geometry import Corners, centre_outline, regular, section_of
-from blocksim.verification import energy
+from blocksim.verification import impacts
 from blocksim.verification.case import Setting
 from blocksim.verification.impacts import LANDINGS
 from blocksim.verification.scene import GOLDEN, HEIGHT, WIDTH, CaseScene, Simulation, Throw, Thrower
@@ -182,13 +182,13 @@ def test_rocking_peaks_at_the_default_step_are_those_of_exact_impact_times(
 
 def test_energy_that_friction_took_and_nobody_tallied_is_noticed() -> None:
     slide = SETTING.start([{"y": HEIGHT / 2, "velocity": [0.5, 0.0]}]).to_time(0.1)
-    assert slide.residual() < energy.RIGID_LEDGER_TOLERANCE
+    assert slide.residual() < impacts.RIGID_LEDGER_TOLERANCE
     slide.scene.contacts.tallies.friction[:] *= 0.999
     assert slide.residual() > 1e-4
 
 
 def test_energy_from_rebounds_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     throws = [Throw(radians(4.0), friction, phase) for friction in (0.7, 1.0) for phase in (0.1, 0.3, 0.5, 0.7, 0.9)]
-    assert energy.largest_gain(Thrower(SETTING, 1.0), throws) < energy.ROUND_OFF
+    assert impacts.largest_gain(Thrower(SETTING, 1.0), throws) < impacts.ROUND_OFF
     monkeypatch.setattr(nonsmooth, "has_impacts_in_rounds", lambda *_: False)  # nobody watches
-    assert energy.largest_gain(Thrower(SETTING, 1.0), throws) > 1e-3
+    assert impacts.largest_gain(Thrower(SETTING, 1.0), throws) > 1e-3

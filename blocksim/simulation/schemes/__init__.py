@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError, InvalidInputError, OutputError
 from blocksim.kernels.common import arrays, compiler, jit, systems
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.options import silent
 from blocksim.scenario import PlacedBody, Scenario, motion, overlap, placement, scenario_from_mapping
 from blocksim.scenario.models.timeline import SCHEMES as TABLES
-from blocksim.silence import silent
 from blocksim.simulation import trajectory
 from blocksim.world import build as scenes
 from blocksim.world.systems import others_of

@@ -12,7 +12,7 @@ from blocksim.kernels.explicit import models, step
 from blocksim.scenario.overlap import penetration
 from blocksim.simulation import schemes, trajectory
 from blocksim.world import build
-from blocksim.world.contact_places import places_of
+from blocksim.world.joints import places_of
 
 WORK_SPACE = ("points", "matrices", "before", "action")
 

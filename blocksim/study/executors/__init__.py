@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 from blocksim.errors import InvalidInputError
-from blocksim.options import Option
+from blocksim.options import Option, silent
 from blocksim.scenario import Scenario, spelling
-from blocksim.silence import silent
 from blocksim.study.rows import Row
 
 SECONDS = 0.5  # of work in a batch
