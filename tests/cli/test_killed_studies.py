@@ -61,20 +61,16 @@ def check_kills(start: Sweep, folder: Path, count: int, shares: Iterable[float],
 def test_sweep_killed_at_20_moments_continues_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
     moments = random.Random(6)  # noqa: S311 - no secret
     check_kills(start, tmp_path, 500, [moments.random() for _ in range(in_all(20))])
-
-
-@pytest.mark.long
-def test_killed_processes_leave_the_same_table(start: Sweep, tmp_path: Path) -> None:
+    shutil.rmtree(tmp_path / "whole")
     check_kills(start, tmp_path, 500, (0.5, 0.8, 1.1), "--executor", "processes")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
-def test_endless_case_is_given_up_at_once(process: Process, tmp_path: Path, number: signal.Signals) -> None:
+def test_endless_case_is_given_up_at_once(process: Process, tmp_path: Path) -> None:
     endless = ("--vary", "time.end=1e4,2e4", "--set", "time.stop_at_rest=false")
     running = process("sweep", "scenarios/three_blocks_nonsmooth.toml", *endless, "--out", "out")
     wait_for(tmp_path / "out" / "manifest.jsonl", running)
     time.sleep(0.2)
-    running.send_signal(number)
+    running.send_signal(signal.SIGINT)
     told = "stopped with 0 of 2 cases done; rerun the command to finish\n"
     assert end_of(running) == Answer(75, "", told)  # the case itself would take longer than that
     assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 1
@@ -119,17 +115,6 @@ def test_of_three_sweeps_that_begin_in_a_folder_at_once_two_are_refused(process:
     told = [(one.communicate()[1], one.returncode) for one in three]
     assert sorted(code for _, code in told) == [-signal.SIGKILL, 73, 73], told
     assert all("is running here" in err or "is already running" in err for err, code in told if code == 73)
-
-
-@pytest.mark.long
-def test_shards_at_a_time_share_a_folder(start: Sweep, process: Process, tmp_path: Path) -> None:
-    finish(start("whole", 20))
-    for running in [start("parts", 20, "--shard", f"{index}/2", "--jobs", 1) for index in range(2)]:
-        finish(running)
-    merged = end_of(process("sweep", "--merge", "parts", "--json"))
-    assert merged.code == 0
-    assert len(json.loads(merged.out)["rows"]) == 20
-    assert (tmp_path / "parts" / "sweep.csv").read_bytes() == (tmp_path / "whole" / "sweep.csv").read_bytes()
 
 
 CLUSTER = """
@@ -223,10 +208,9 @@ def test_calibration_stopped_killed_and_resumed_finds_the_same(
     assert (tmp_path / "cut.toml").read_text() == (tmp_path / "whole.toml").read_text()
 
 
-@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.long)])
-def test_ctrl_c_ends_all_runs_of_a_convergence_with_75(process: Process, tmp_path: Path, jobs: int) -> None:
+def test_ctrl_c_ends_all_runs_of_a_convergence_with_75(process: Process, tmp_path: Path) -> None:
     endless = ("--set", "time.end=1e4", "--set", "time.stop_at_rest=false", "--set", "output.every=10")
-    running = process("converge", "scenarios/three_blocks_nominal.toml", *SOFT, *endless, "--jobs", jobs, "-q")
+    running = process("converge", "scenarios/three_blocks_nominal.toml", *SOFT, *endless, "--jobs", 2, "-q")
     wait_until(lambda: any(tmp_path.glob("results/three_blocks_nominal/converge/*/run.h5")), running)
     running.send_signal(signal.SIGINT)
     assert end_of(running) == Answer(75, "", "stopped after 0 runs; rerun the command to finish\n")

