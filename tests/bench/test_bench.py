@@ -11,16 +11,13 @@ import pytest
 
 from blocksim.bench import registry
 from blocksim.bench.harness import (
-    UNTIL_SOLVED,
     Benchmark,
     Effort,
     Number,
     Readings,
     Rerun,
     RunFailedError,
-    TimeSteps,
     machine_lines,
-    pushed_wall,
     repeat,
     report,
     single,
@@ -31,7 +28,6 @@ from blocksim.bench.registry import MEASUREMENTS, START_UP, StartError, UnknownM
 from blocksim.bench.three_blocks import CLOSE, SETTINGS, Solution, converged_levels, scatter_friction
 from blocksim.errors import ExitCode
 from blocksim.scenario import load_scenario, place_bodies
-from blocksim.scenario.models.timeline import Nonsmooth
 from tests.golden import Golden
 
 NOMINAL = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
@@ -170,24 +166,6 @@ def test_three_blocks_are_those_of_the_scenario_that_ships() -> None:
     assert place_bodies(ours) == place_bodies(shipped)
     for table in ("materials", "blocks", "ground", "friction", "contact", "time", "gravity"):
         assert getattr(ours, table) == getattr(shipped, table), table
-
-
-def test_a_stepping_is_what_the_scenario_gets() -> None:
-    time = three_blocks(time=TimeSteps(2e-3, substeps=3, velocity_sweeps=5).time(end=0.5)).time
-    assert isinstance(time, Nonsmooth)
-    assert (time.step, time.substeps, time.velocity_sweeps, time.end) == (2e-3, 3, 5, 0.5)
-    default = three_blocks(time={"scheme": "nonsmooth"}).time
-    assert isinstance(default, Nonsmooth)
-    assert TimeSteps(1e-3).velocity_sweeps == UNTIL_SOLVED == default.velocity_sweeps
-
-
-def test_a_wall_is_pushed_in_proportion_to_height() -> None:
-    placed = place_bodies(pushed_wall(4, 3))
-    y, vx = np.array([(body.y, body.vx) for body in placed]).T
-    assert len(placed) == 12
-    assert {(body.size_x, body.size_y, body.depth) for body in placed} == {(0.05, 0.032, 0.025)}
-    assert vx == pytest.approx(1.0 * y / 0.096)
-    assert not any(body.vy or body.spin for body in placed)
 
 
 def test_every_run_starts_from_the_same_state() -> None:

@@ -12,7 +12,6 @@ from blocksim.errors import InvalidInputError
 from blocksim.simulation import instruments, simulate_into
 from blocksim.simulation.trajectory import CONTACT_ROW, Contacts, Frames
 from blocksim.view import run_data
-from blocksim.view.animation import Look, Pace, draw_animation
 from blocksim.view.arrows import FORCE, Actions, actions_on, force_scale
 from blocksim.view.kinds import RUN_KINDS
 from blocksim.view.report.page import page_text
@@ -47,16 +46,6 @@ def test_missing_contacts_are_reported_with_what_to_do(tmp_path: Path, kind: str
     with pytest.raises(InvalidInputError, match=r"stored no contacts.* --set output\.contacts=true"):
         RUN_KINDS[kind](toppling(3), tmp_path / "picture.png", PictureOptions(forces=True))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_animation_with_forces_differs_and_one_of_a_run_without_is_refused(tmp_path: Path) -> None:
-    frames, pace = pressed(toppling(2, steps=4)), Pace(1.0, 5.0)
-    draw_animation(frames, tmp_path / "with.gif", pace, Look(240, forces=True))
-    draw_animation(frames, tmp_path / "without.gif", pace, Look(240))
-    assert (tmp_path / "with.gif").read_bytes() != (tmp_path / "without.gif").read_bytes()
-    with pytest.raises(InvalidInputError, match="stored no contacts"):
-        draw_animation(toppling(2), tmp_path / "none.gif", pace, Look(240, forces=True))
-    assert not (tmp_path / "none.gif").exists()
 
 
 def actions(loads: Sequence[Mapping[str, object]], frames: Frames, **tables: Any) -> Actions:

@@ -16,7 +16,6 @@ from blocksim.view.sweeps.data import (
     InputUnit,
     SweepData,
     choose_movers,
-    outcome_label,
     percent,
     short_names,
     value_axis,
@@ -26,9 +25,7 @@ from blocksim.view.sweeps.outcome_map import (
     CLASS_COLOURS,
     OTHER_COLOUR,
     classes_of,
-    edges_of,
     manners_of,
-    outline_of,
     run_out_scale,
 )
 from blocksim.view.sweeps.scatter import MOST_INPUTS, limits_of, variables_of
@@ -49,11 +46,6 @@ def turned(turns: NDArray[np.float64]) -> SweepData:
 def test_outcomes_are_quarters_of_a_turn_and_none_where_a_case_failed() -> None:
     sweep = turned(np.array([[np.nan, np.nan], [0.4, -89.0], [0.0, 44.0], [-0.2, -181.0]]))
     assert replace(sweep, finished=np.arange(4) > 0).outcomes == [None, (0, -90), (0, 0), (0, -180)]
-
-
-def test_classes_of_many_blocks_are_counted() -> None:
-    assert outcome_label((0, -90)) == "0°/−90°"
-    assert outcome_label((0, 90, 0, 0, 0, -90, 0)) == "2 of 7 turned"
 
 
 @pytest.mark.parametrize(
@@ -142,32 +134,6 @@ def test_only_smooth_series_are_joined() -> None:
 def test_blocks_that_stay_are_left_out_and_many_are_cut() -> None:
     chosen = {count: choose_movers(np.ptp(series(count).x_mm, axis=0)) for count in (1, 3, 60)}
     assert chosen == {1: [0], 3: [1, 2], 60: list(range(60 - MOST_ROWS, 60))}
-
-
-def test_case_that_failed_has_a_class_of_its_own() -> None:
-    found = classes_of(made_up(grid(), failed=1))
-    assert found.numbers[0] == found.numbers.max() == len(found.labels) - 1
-    assert found.labels[-1].startswith("failed")
-
-
-def test_edges_lie_midway_between_cells() -> None:
-    assert edges_of(np.array([1.0, 2.0, 4.0]), is_log=False).tolist() == [0.5, 1.5, 3.0, 5.0]
-    assert edges_of(np.array([1.0, 100.0]), is_log=True).tolist() == pytest.approx([0.1, 10.0, 1000.0])
-    assert edges_of(np.array([3.0]), is_log=False).tolist() == [1.5, 4.5]
-    low, high = edges_of(np.zeros(1), is_log=False)
-    assert low < 0.0 < high
-
-
-def test_outline_goes_once_around_cells_that_agree() -> None:
-    edges = np.arange(4.0)
-    middle = np.zeros((3, 3), dtype=bool)
-    middle[1, 1] = True
-    sides = {tuple(side) for side in outline_of(middle, edges, edges)}
-    corners = [(1.0, 1.0), (2.0, 1.0), (1.0, 2.0), (2.0, 2.0)]
-    a, b, c, d = corners
-    assert sides == {(a, b), (a, c), (b, d), (c, d)}
-    assert len(outline_of(np.ones((3, 3), dtype=bool), edges, edges)) == 12  # the border alone
-    assert outline_of(np.zeros((3, 3), dtype=bool), edges, edges) == []
 
 
 def test_measured_class_comes_first_and_rare_ones_are_taken_together() -> None:
