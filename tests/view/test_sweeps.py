@@ -16,6 +16,7 @@ from blocksim.view.sweeps.data import (
     InputUnit,
     SweepData,
     choose_movers,
+    outcome_label,
     percent,
     short_names,
     value_axis,
@@ -46,6 +47,10 @@ def turned(turns: NDArray[np.float64]) -> SweepData:
 def test_outcomes_are_quarters_of_a_turn_and_none_where_a_case_failed() -> None:
     sweep = turned(np.array([[np.nan, np.nan], [0.4, -89.0], [0.0, 44.0], [-0.2, -181.0]]))
     assert replace(sweep, finished=np.arange(4) > 0).outcomes == [None, (0, -90), (0, 0), (0, -180)]
+
+
+def test_classes_of_many_blocks_are_counted() -> None:
+    assert outcome_label((0, 90, 0, 0, 0, -90, 0)) == "2 of 7 turned"
 
 
 @pytest.mark.parametrize(
