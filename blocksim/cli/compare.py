@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.analysis import QUANTITIES, compare, evidence, metrics
+from blocksim.analysis import compare, evidence, metrics
+from blocksim.analysis.experiment import QUANTITIES
 from blocksim.cli import command_line, output
 from blocksim.errors import ExitCode
 from blocksim.options import Option

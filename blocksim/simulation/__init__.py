@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from blocksim.simulation.ensemble import MemberEnd, MemberFailure, run_ensemble, run_in_batches
+    from blocksim.simulation.ensemble import MemberFailure, run_ensemble, run_in_batches
     from blocksim.simulation.loop import Progress, Watcher
     from blocksim.simulation.results import Result, Summary, read_result, renew_copies
     from blocksim.simulation.run import simulate, simulate_into
@@ -12,7 +12,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Frames",
-    "MemberEnd",
     "MemberFailure",
     "Progress",
     "Result",
@@ -28,7 +27,7 @@ __all__ = [
 
 # found when first asked for, so that stored results can be read without waiting for numba and the kernels
 _HOMES = {
-    "ensemble": ("MemberEnd", "MemberFailure", "run_ensemble", "run_in_batches"),
+    "ensemble": ("MemberFailure", "run_ensemble", "run_in_batches"),
     "trajectory": ("Frames",),
     "loop": ("Progress", "Watcher"),
     "results": ("Result", "Summary", "read_result", "renew_copies"),

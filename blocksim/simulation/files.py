@@ -108,7 +108,7 @@ def sync_file(path: Path) -> None:
 
 @contextlib.contextmanager
 def atomic_file(path: Path) -> Iterator[BinaryIO]:
-    """Give a file that takes the place of `path` at the end, when it is on the disk. Raises what `replacing` raises."""
+    """Give a file that takes the place of `path` at the end, when it is on the disk. Raises as `atomic_path`."""
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         yield file
         file.flush()

@@ -1,9 +1,13 @@
 """What results show in a notebook, and give as pictures, animations and pages in memory."""
 
+from base64 import b64encode
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
+from html import escape
 from pathlib import Path
-from typing import Any, NamedTuple
+from tempfile import TemporaryDirectory
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -13,17 +17,108 @@ from blocksim.analysis.metrics import Judgement
 from blocksim.errors import InvalidInputError
 from blocksim.notebook import Shown
 from blocksim.scenario import Scenario, place_bodies
-from blocksim.simulation import Result
+from blocksim.simulation import Result, files
 from blocksim.simulation.instruments import FrameRows, frames_from_rows
 from blocksim.study import answer, pictures, report, run_folder
 from blocksim.study.answer import UnstoredResult
 from blocksim.study.capacity import CapacityAnswer
 from blocksim.view import style
-from blocksim.view.display import AnimationDisplay, PageDisplay, PictureDisplay
 from blocksim.view.kinds import CAPACITY, FINAL, MOTION
 from blocksim.view.report import page
 from blocksim.world.systems import others_of
 from blocksim.world.systems.blocks import block_system
+
+FRAME_HEIGHT = 760  # pixels, of a report within a notebook
+PNG, GIF, HTML = ".png", ".gif", ".html"
+
+
+def _image(content: bytes, kind: str, what: str) -> str:
+    source = f"data:image/{kind};base64,{b64encode(content).decode()}"
+    return f'<img src="{source}" alt="{escape(what)}" style="max-width:100%">'
+
+
+@dataclass(frozen=True, repr=False)
+class PictureDisplay:
+    """A figure that is not written yet; `dots` are those an inch of a PNG."""
+
+    figure: "style.Figure"
+    dots: float | None = None
+
+    def content(self, suffix: str = PNG) -> bytes:
+        """Return the bytes of the file that `blocksim plot` writes, in the format of a suffix."""
+        with style.in_style(self.dots):
+            return style.figure_bytes(self.figure, suffix)
+
+    def save(self, path: Path | str, *, overwrite: bool = False) -> Path:
+        """Write PNG, SVG or PDF. Raises InvalidInputError, OutputExistsError, OutputError."""
+        path = style.picture_path(path)
+        files.refuse_foreign(path, overwrite=overwrite)
+        files.write_bytes(path, self.content(path.suffix.lower()))
+        return path
+
+    def _repr_png_(self) -> bytes:
+        return self.content()
+
+    def _repr_html_(self) -> str:
+        return _image(self.content(), "png", "picture")
+
+
+@dataclass(frozen=True, repr=False)
+class AnimationDisplay:
+    """A run over time; `draw` writes it into a file, `last` is a picture of its end."""
+
+    figure: ClassVar[None] = None
+    draw: Callable[[Path], object]
+    last: Callable[[], PictureDisplay]
+
+    @cached_property
+    def gif(self) -> bytes:
+        """The GIF, drawn when first asked for."""
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / f"animation{GIF}"
+            self.draw(path)
+            return path.read_bytes()
+
+    def save(self, path: Path | str, *, overwrite: bool = False) -> Path:
+        """Write GIF or MP4. Raises InvalidInputError, OutputExistsError, OutputError, UnavailableError."""
+        path = Path(path)
+        files.refuse_foreign(path, overwrite=overwrite)
+        if path.suffix.lower() == GIF:
+            files.write_bytes(path, self.gif)
+        else:
+            self.draw(path)
+        return path
+
+    def _repr_png_(self) -> bytes:
+        return self.last().content()
+
+    def _repr_html_(self) -> str:
+        return _image(self.gif, "gif", "animation")
+
+
+@dataclass(frozen=True, repr=False)
+class PageDisplay:
+    """A page of a report, all in one text."""
+
+    text: str
+    figure: ClassVar[None] = None
+
+    def save(self, path: Path | str, *, overwrite: bool = False) -> Path:
+        """Write HTML. Raises InvalidInputError for another suffix, OutputExistsError, OutputError."""
+        path = Path(path)
+        if path.suffix.lower() != HTML:
+            raise InvalidInputError(f"{path}: '{path.suffix}' unsupported format; use {HTML}")
+        files.refuse_foreign(path, overwrite=overwrite)
+        files.write_bytes(path, self.text.encode(errors="replace"))
+        return path
+
+    def _repr_png_(self) -> None:
+        return None
+
+    def _repr_html_(self) -> str:
+        look = f"width:100%;height:{FRAME_HEIGHT}px;border:0"
+        return f'<iframe srcdoc="{escape(self.text)}" style="{look}"></iframe>'
+
 
 SIZES = np.zeros((2, 2))  # of two frames: contacts and overlaps
 

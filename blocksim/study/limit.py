@@ -86,7 +86,7 @@ def limit(scenario: Source, options: limit_plan.LimitOptions) -> limit_answer.Li
     """Find the values of a key at which a structure stops, or begins, to stand.
 
     There may be several changes, but those of an island between two scanned values are not seen. `stands`: see
-    `blocksim.study.criterion`. sweep.Runs are kept, with `keep_runs` those of both sides of a bracket with frames and
+    `blocksim.study.criterion`. Runs are kept, with `keep_runs` those of both sides of a bracket with frames and
     contacts, for `plot` and `report`; the same call again does only what is missing. Under sustained loads runs begin
     at rest, unless the scenario has `start.settle = false`. The executor does not change the answer. `on_run` is called
     with each value, verdict and row. Raises ScenarioError, InvalidInputError, OutputExistsError where the folder is not

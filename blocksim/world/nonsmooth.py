@@ -155,7 +155,7 @@ def _stepping(layout: Layout, stride: step.Stride) -> dict[str, float]:
     }
 
 
-def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1) -> arrays.Nonsmooth:
+def with_lists(world: World, stepping: Records, capacity: int) -> arrays.Nonsmooth:
     """Return worlds (one, or a stack) with empty constraints, as many as there is room for pairs."""
     *members, bodies = world.bodies.shape
     # full packs, and those in every colour that are not
@@ -171,7 +171,7 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
         tallies=zeros((*members, count // arrays.TALLY_PACKS + 1), arrays.TALLY),
         impacts=zeros((*members, bodies), arrays.IMPACT) if follows else None,
         impact_lanes=zeros((*members, count), arrays.IMPACT_LANES) if follows else None,
-        residuals=build.numbers((*members, 2, LINE_WORDS * threads), np.float64),
+        residuals=build.numbers((*members, 2, LINE_WORDS), np.float64),
         stepping=stepping,
     )
     return arrays.Nonsmooth(

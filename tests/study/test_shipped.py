@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.analysis import Verdict
+from blocksim.analysis.compare import Verdict
 from blocksim.scenario import Document, load_scenario
 from blocksim.scenario.models.motion import read_record
 from blocksim.scenario.units import STANDARD_GRAVITY

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.analysis import load_table
+from blocksim.analysis.experiment import load_table
 from blocksim.scenario import PlacedSegment, scenario_from_mapping
 from blocksim.scenario.geometry import regular
 from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure, Stretch

@@ -242,7 +242,7 @@ class Pulse(Table):
     2 pi A cycles/w^2, a full cosine neither.
 
     A cosine or rectangle at time zero finds blocks that have settled into it, as with `start.settle`, as far as
-    friction carries its inertial force: see simulation/settling.py. One that begins later finds springs that carry
+    friction carries its inertial force: see simulation/rest_state.py. One that begins later finds springs that carry
     none of it; run.json warns where that makes a slip too large.
     """
 

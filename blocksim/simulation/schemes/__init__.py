@@ -121,7 +121,7 @@ class Scheme:
     # brings its arrays up to date with bodies that an event has changed, given these before; whether a call that goes
     # to no further step is to evaluate contacts anew
 
-    # compiling: sets of machine code by name, see compilation.py
+    # compiling: sets of machine code by name
     kernels: Callable[[str], str]  # that it needs with a contact model
     of_outlines: Mapping[str, str] = field(default_factory=dict)  # the set instead of another, with any polygon
     kernel_variant: Callable[[str, Scenario, Sequence[PlacedBody] | None], str] = lambda scene, *_: (
