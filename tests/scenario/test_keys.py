@@ -92,6 +92,10 @@ def test_nearest_allows_so_many_letters_replaced_added_dropped_or_swapped(
     assert nearest(word, known, most=most) == meant
 
 
+def test_a_long_word_with_several_wrong_letters_is_not_taken_for_its_beginning() -> None:
+    assert meant_word("resttiuion", ("res", "restitution")) == "restitution"
+
+
 def test_symbols_of_papers_and_words_of_other_programs_lead_to_keys_that_exist() -> None:
     assert meant_word("vx", ["x", "y", "velocity"]) == "velocity"
     assert meant_word("e", ["young_modulus", "density"]) == "young_modulus"

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import Collection, LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.text import Text
 
@@ -36,7 +37,8 @@ def _written(texts: Iterable[Text]) -> list[str]:
 
 def _drawn(axes: Axes) -> list[str]:
     told = [
-        f"line {to_hex(line.get_color())} {line.get_linestyle()} {line.get_marker()}: {_way(line.get_xydata())}"
+        f"line {to_hex(line.get_color())} {line.get_linestyle()} {_marker(line)} z{line.get_zorder():g}: "
+        f"{_way(line.get_xydata())}"
         for line in axes.lines[:MOST]
     ]
     if len(axes.lines) > MOST:
@@ -45,13 +47,17 @@ def _drawn(axes: Axes) -> list[str]:
     return told + [_area(one) for one in axes.patches]
 
 
+def _marker(line: Line2D) -> str:
+    has_none = line.get_marker() in {"None", "", None}
+    return "None" if has_none else f"{line.get_marker()} of {line.get_markersize():g} points"
+
+
 def _area(patch: Patch) -> str:
     """Return the colour of an area, and its corners or the box around many."""
     path = patch.get_path()
     corners = patch.get_patch_transform().transform(np.asarray(path.vertices))
-    if len(corners) <= CORNERS:
-        return f"{type(patch).__name__} {to_hex(patch.get_facecolor())}: {' '.join(map(_numbers, corners))}"
-    return f"{type(patch).__name__} {to_hex(patch.get_facecolor())}: {_way(corners)}"
+    look = f"{type(patch).__name__} {to_hex(patch.get_facecolor())} edge {patch.get_linewidth():.3g}"
+    return f"{look}: {' '.join(map(_numbers, corners)) if len(corners) <= CORNERS else _way(corners)}"
 
 
 def _parts(parts: Collection) -> str:
@@ -64,7 +70,8 @@ def _parts(parts: Collection) -> str:
     points = points[np.isfinite(points).all(axis=1)]
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else ((), ())
     count = len(places) if len(places) > 1 else len(paths)
-    told = f"{count} {type(parts).__name__} {shown}{f' {parts.get_hatch()}' if parts.get_hatch() else ''}"
+    widths = " ".join(f"{width:.3g}" for width in dict.fromkeys(np.atleast_1d(parts.get_linewidth()).tolist()))
+    told = f"{count} {type(parts).__name__} {shown}{f' {parts.get_hatch()}' if parts.get_hatch() else ''} edge {widths}"
     if len(places) > 1 or len(points) > CORNERS:
         return f"{told} in {_numbers([*low, *high])}"
     return f"{told}: {'; '.join(' '.join(map(_numbers, np.asarray(path.vertices))) for path in paths)}"
