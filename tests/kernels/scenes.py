@@ -352,15 +352,9 @@ def on_hills() -> World:
     return soft_world(blocks, ground={"profile": profile})
 
 
-def with_particles(model: str) -> World:
-    """Return rows of blocks that touch at particles."""
-    return soft_world(rows(9, 6), contact={"model": model, "particle_spacing": 8e-3})
-
-
 SCENES: dict[str, tuple[Callable[[], World], int]] = {  # and steps
     "wall with Hertz law": (lambda: wall(law="hertz-mindlin"), 1500),
     "among moving supports": (lambda: shake(among_fixed()), 1500),
     "on moving hills": (lambda: shake(on_hills()), 1500),
-    "discs": (lambda: with_particles("particles"), 600),
-    "kernel": (lambda: with_particles("kernel"), 300),
+    "discs": (lambda: soft_world(rows(9, 6), contact={"model": "particles", "particle_spacing": 8e-3}), 600),
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp
+from math import atan2, exp, hypot
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +25,8 @@ from blocksim.kernels.explicit.laws import (
     tangent_stiffness,
 )
 from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, side_normal
-from blocksim.scenario.laws import LAWS
+from blocksim.scenario.laws import LAWS, Law
+from blocksim.verification.scene import HEIGHT, WIDTH
 from tests.kernels.scenes import pose
 
 if TYPE_CHECKING:
@@ -56,6 +57,29 @@ def test_restitution_is_the_one_asked_at_any_speed(start: Start, paper_block: Pa
             scene.to_step(scene.steps + 1)
         assert scene.bodies[0].vy == pytest.approx(e * speed, abs=0.01 * speed)
         assert scene.residual() < 1e-3
+
+
+X, Y = 0.5 * WIDTH, 0.5 * HEIGHT
+OUTLINE = {"outline": [[-X, -Y], [X, -Y], [X, Y], [-X, Y]]}
+
+
+@pytest.mark.parametrize(("angle", "e"), [(0.0, 0.31), (atan2(WIDTH, HEIGHT), 0.89)])  # flat, and a central impact
+@pytest.mark.parametrize("shape", [{}, OUTLINE], ids=["rectangle", "polygon"])
+def test_law_is_its_power_alone(
+    start: Start, monkeypatch: pytest.MonkeyPatch, shape: dict[str, object], angle: float, e: float
+) -> None:
+    """A third one, in the place of Hertz's, rebounds as asked and keeps its energy; no other test has these e."""
+    third = Law("hertz-mindlin", 1.25, lambda depth, radius: depth**0.5 * radius**0.25)
+    monkeypatch.setitem(LAWS, "hertz-mindlin", third)
+    stiff, soft = (third.greatest_slope(1e9, 2.0, speed, 0.0) for speed in (4.0, 1.0))
+    assert stiff / soft == pytest.approx(4.0 ** (2.0 * 0.25 / 2.25))  # of d^0.25, d going with v^(2/2.25)
+    falling = {"y": (hypot(X, Y) if angle else Y) + 1e-9, "angle": angle, "velocity": [0.0, -1.0], **shape}
+    scene = start([falling], restitution=e, gravity=0.0, contact=SOFT_HERTZ)
+    while scene.contacts or scene.bodies[0].vy < 0.0:
+        scene.to_step(scene.steps + 1)
+    assert scene.world.controls[0].exponent == 1.25
+    assert scene.bodies[0].vy == pytest.approx(e, abs=0.01)
+    assert scene.residual() < 1e-3
 
 
 REMEMBERED = ("spring", "depth", "normal_force", "shear_force")
