@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import AT_REST, LEDGER, REACHED, zeros
-from blocksim.kernels.common.mechanics import potential_energy, renew_rotations
+from blocksim.kernels.common.energy import potential_energy
+from blocksim.kernels.common.mechanics import renew_rotations
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
-from blocksim.kernels.explicit.contact import is_too_deep, pair_forces
-from blocksim.kernels.explicit.step import LEDGER_ROW, check, contact_summary, measure, tallied
+from blocksim.kernels.explicit.contact import pair_forces
+from blocksim.kernels.explicit.depth import is_too_deep
+from blocksim.kernels.explicit.energy import contact_summary, tallied
+from blocksim.kernels.explicit.step import check
 from blocksim.verification.scene import HEIGHT
 from tests.kernels.scenes import pose
 
@@ -87,28 +90,10 @@ def test_springs_hold_half_of_force_times_way() -> None:
     assert shear == pytest.approx(0.5 * pair.shear_ratio * pair.normal_stiffness * 3e-6**2, rel=1e-12)
 
 
-SOFT = {"stiffness_scale": 1e-4}  # a hundredth of the steps
-
-
 def test_potential_energy_counts_against_gravity_also_on_a_slope(start: Start, paper_block: PaperBlock) -> None:
     scene = start([{"x": 0.5, "y": 1.0}, {"x": -0.2, "y": 2.0}], tilt=0.2)
     expected = sum(paper_block.mass * 9.81 * (sin(0.2) * x + cos(0.2) * y) for x, y in ((0.5, 1.0), (-0.2, 2.0)))
     assert potential_energy(scene.world) == pytest.approx(expected, rel=1e-12)
-
-
-def test_row_of_the_ledger_has_the_documented_order(start: Start) -> None:
-    scene = start([{"y": 0.03, "angle": 0.6, "velocity": [0.3, -1.0]}], contact=SOFT).to_time(0.02)
-    row = np.zeros(len(LEDGER_ROW) + 2)
-    measure(scene.world, row)
-    named = dict(zip(LEDGER_ROW, row, strict=False))
-    normal, shear, count, overlap = contact_summary(scene.world)
-    assert named["potential"] == potential_energy(scene.world)
-    assert (named["stored_normal"], named["stored_shear"]) == (normal, shear)
-    assert (named["dashpot"], named["friction"], named["broken"]) == tallied(scene.world.ledger)
-    assert named["to_support"] == scene.world.ledger[0].to_support
-    assert (row[-2], row[-1]) == (count, overlap)
-    assert named["dashpot"] > 0.0
-    assert named["friction"] > 0.0
 
 
 def test_losses_are_those_of_all_tallies() -> None:

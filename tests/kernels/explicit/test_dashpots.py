@@ -11,7 +11,7 @@ from hypothesis import example, given, strategies as st
 
 from blocksim.kernels.common.arrays import CONTACT, INTERACTION, NORMAL, OPERATOR, PAIR, POINT, SHEAR, zeros
 from blocksim.kernels.common.tolerances import DASHPOT_RANK, OPERATOR_LIFE
-from blocksim.kernels.explicit.contact import shared_step, spare_lost_faces
+from blocksim.kernels.explicit.contact import shared_step
 from blocksim.kernels.explicit.damping import (
     BOTH,
     SIZE,
@@ -48,9 +48,7 @@ def test_operator_of_one_direction_is_due_after_as_many_uses_as_it_was_kept_for(
     assert pair.sticking == (2 if direction == NORMAL else 1)  # normals have their dashpots always
 
 
-@pytest.mark.parametrize(
-    ("restitution", "friction", "way"), [(0.2, 0.1, 1.0), (0.2, 0.5, -1.0), (0.5, 0.5, 1.0), (0.8, 0.1, -1.0)]
-)
+@pytest.mark.parametrize(("restitution", "friction", "way"), [(0.2, 0.5, -1.0), (0.5, 0.5, 1.0)])
 def test_corner_that_slides_rebounds_as_asked(start: Start, restitution: float, friction: float, way: float) -> None:
     """With the mass of a corner without friction it left at 0.45 to 0.57 of its speed where 0.5 was asked."""
     turned, speed = pi / 6.0, 1.0
@@ -212,19 +210,6 @@ def test_operator_of_contacts_that_are_not_steady_keeps_its_masses_only() -> Non
     made = [[one.operators[0, NORMAL][name] for name in OPERATOR.names or ()] for one in (world, other)]
     assert made[0] == pytest.approx(made[1], rel=1e-12)
     assert lives(world)[NORMAL] == OPERATOR_LIFE - 1
-
-
-@pytest.mark.parametrize(("beside", "lost"), [(np.inf, False), (1.1e-6, False), (0.9e-6, True)])
-@pytest.mark.parametrize("closing", [1e-7, -1e-7])
-def test_corner_about_to_lose_its_face_has_no_dashpot_on_it(beside: float, lost: bool, closing: float) -> None:
-    world = two_points(1, NORMAL)
-    point = world.points[0]
-    world.pairs["normal_left"] = world.pairs["shear_left"] = 5
-    point.closing, point.beside = closing, beside
-    world.points.beside[1] = np.inf
-    spare_lost_faces(world, 0, 2)
-    assert world.points.weight[:2].tolist() == [0.0 if lost else 1.0, 1.0]
-    assert lives(world) == ([0, 0] if lost else [5, 5])
 
 
 def test_dashpot_that_pulls_more_than_the_spring_pushes_leaves_no_force() -> None:

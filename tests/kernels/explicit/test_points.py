@@ -230,24 +230,10 @@ def test_weight_of_a_row_is_the_integral_of_the_kernel_along_it(along: float) ->
     assert sums.weight == pytest.approx(np.trapezoid(values, places), rel=1e-12)
 
 
-BROAD = 2.2 * WIDTH
-SPACINGS = [0.5e-3, 1e-3, 2e-3, 4e-3]
-DEPTHS = st.floats(1e-9, 1e-4)
-
-
-@pytest.mark.parametrize("spacing", SPACINGS)
+@pytest.mark.parametrize("spacing", [0.5e-3, 1e-3, 2e-3, 4e-3])
 @pytest.mark.parametrize("below", [None, WIDTH])
 def test_face_has_the_stiffness_of_two_corners_at_any_spacing(spacing: float, below: float | None) -> None:
     corners, particles = (touch(model, spacing=spacing, below=below) for model in ("surface", "kernel"))
     assert len(corners.points) == 2
     assert len(particles.points) > WIDTH / spacing
     assert particles.wrench() == pytest.approx(corners.wrench(), abs=1e-18)
-
-
-@given(shift=st.floats(-0.6 * WIDTH, 0.6 * WIDTH), depth=DEPTHS, spacing=st.sampled_from(SPACINGS))
-def test_block_sliding_along_a_flat_face_feels_no_bump(shift: float, depth: float, spacing: float) -> None:
-    found = touch("kernel", shift=shift, depth=depth, spacing=spacing, below=BROAD)
-    assert np.abs(found.normals[:, 0]).max() < 1e-12
-    assert found.points.depth == pytest.approx(depth, rel=1e-6, abs=1e-16)
-    is_own = found.points.slot < found.upper.particle_count
-    assert found.points.share[is_own].sum() == pytest.approx(1.0, rel=1e-12)  # half of a face, wherever it stands
