@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, World
-from blocksim.kernels.common.mechanics import kick_and_drift
 from blocksim.kernels.common.jit import config
+from blocksim.kernels.common.mechanics import kick_and_drift
 from blocksim.kernels.explicit.partition import add_from_before, partition
 from blocksim.kernels.explicit.step import advance, forces_between, forces_within
 from blocksim.simulation.schemes import ALONE, Team

@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 from blocksim.kernels.common.arrays import AT_REST, BODY, CONTROLS, MOTION_PIECE, REACHED, Records, World, zeros
 from blocksim.kernels.common.mechanics import accelerate_and_kick
 from blocksim.kernels.common.members import Watched, frame_to_watch, watch
-from blocksim.kernels.common.supports import acceleration, displacement, tally_support
+from blocksim.kernels.common.supports import acceleration, displacement, tally_moved
 from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
 from blocksim.world.build import build_world
 
@@ -135,7 +135,7 @@ def test_work_on_the_support_is_tallied_by_the_trapezoid_rule_and_its_totals_are
     for body, force in ((wall, 5.0), (ground, -7.0)):
         body.vx, body.vy, body.fx, body.fy, body.torque = 0.2, -0.1, force, 2.0 * force, 1.0
     before = float(world.ledger[0].to_support)
-    tally_support(world, step)
+    tally_moved(world, step, False)
     work = 0.5 * step * (0.2 * (1.0 + 2.0 + 5.0 - 7.0) - 0.1 * (3.0 + 4.0 + 10.0 - 14.0))
     assert world.ledger[0].to_support - before == pytest.approx(work)
     assert world.moved["fx"].tolist() == [5.0, -7.0]

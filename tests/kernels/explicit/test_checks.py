@@ -9,13 +9,10 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import AT_REST, LEDGER, REACHED, zeros
-from blocksim.kernels.common.energy import potential_energy
-from blocksim.kernels.common.mechanics import renew_rotations
+from blocksim.kernels.common.mechanics import potential_energy, renew_rotations
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
-from blocksim.kernels.explicit.contact import pair_forces
-from blocksim.kernels.explicit.depth import is_too_deep
-from blocksim.kernels.explicit.energy import contact_summary, tallied
-from blocksim.kernels.explicit.step import check
+from blocksim.kernels.explicit.contact import is_too_deep, pair_forces
+from blocksim.kernels.explicit.step import check, contact_summary, tallied
 from blocksim.verification.scene import HEIGHT
 from tests.kernels.scenes import pose
 
