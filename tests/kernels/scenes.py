@@ -17,7 +17,7 @@ import numpy as np
 from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import ALL, BODY, MOTION_PIECE, TEAM_SIZE, zeros
 from blocksim.kernels.common.mechanics import renew_rotations
-from blocksim.kernels.common.shapes import place_corners, separation
+from blocksim.kernels.common.shapes import place_corners
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.nonsmooth.motion import load_states
@@ -87,18 +87,6 @@ def pose(*poses: tuple[float, float, float], **tables: object) -> World:
     renew_rotations(world.bodies)
     assert rebuild_pairs(world)
     return world
-
-
-def brought_near(b: Record, sides_of_a: NDArray[np.float64], angle: float, way: float, gap: float) -> Record:
-    """Return a body with a gap (m) to b, negative for an overlap, in the direction `way` (rad) from it."""
-    near, far = 0.0, 0.1
-    while True:
-        distance = (near + far) / 2
-        place = b.x + distance * np.cos(way), b.y + distance * np.sin(way)
-        a = make_body(*place, angle, width=sides_of_a[0], height=sides_of_a[1])
-        if far - near < 1e-7:
-            return a
-        near, far = (near, distance) if separation(a, b) > gap else (distance, far)
 
 
 def rigid(scenario: Scenario, **stepping: Any) -> Scenario:

@@ -6,8 +6,6 @@ import logging
 import multiprocessing
 import os
 import shutil
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +17,6 @@ from numba.core.types import abstract, functions
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.arrays import PAIR, zeros
 from blocksim.kernels.common.compiler import INNER, InnerLibrary, shortcuts
-from blocksim.kernels.common.jit import njit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -49,10 +46,8 @@ def fresh_folder_choice() -> Iterator[None]:
 
 REFUSED: dict[str, tuple[int, int]] = {
     "group": (0o770, 0o755),
-    "all": (0o777, 0o755),
     "all, sticky": (0o1777, 0o755),
     "all, a folder above": (0o700, 0o777),
-    "group, a folder above": (0o700, 0o770),
     "another user": (0o700, 0o755),
 }
 
@@ -138,12 +133,10 @@ def test_without_a_writable_folder_the_temporary_one_serves_and_without_that_ker
     assert double()(3.0) == 6.0
 
 
-def test_cache_root_follows_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cache_is_where_the_desktop_keeps_caches_unless_told_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("BLOCKSIM_CACHE_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
     assert jit.cache_root() == Path("/somewhere/blocksim")
-    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", "/elsewhere")
-    assert jit.cache_root() == Path("/elsewhere")
 
 
 def test_hash_sees_every_source_below_the_folder(copied_kernels: Path) -> None:
@@ -199,13 +192,10 @@ def test_kernel_is_compiled_once_whatever_integers_it_is_called_with(monkeypatch
 
 DAMAGE: dict[str, Callable[[bytes], bytes]] = {
     "cut": lambda content: content[:-100],
-    "empty": lambda _: b"",
-    "zeros": lambda content: bytes(len(content)),
     "bit": lambda content: content[:-2000] + bytes([content[-2000] ^ 1]) + content[-1999:],
 }
 OTHERS: dict[str, Callable[[Path], None]] = {
     "writable for all": lambda file: file.chmod(0o666),
-    "writable for the group": lambda file: file.chmod(0o660),
     "folder writable for all": lambda file: file.parent.chmod(0o777),
 }
 
@@ -292,27 +282,6 @@ def test_user_without_a_home_folder_can_compile(monkeypatch: pytest.MonkeyPatch)
     assert jit.cache_folder.__wrapped__() is not None
 
 
-@pytest.mark.usefixtures("compiler")
-def test_kernel_starts_without_the_blas_that_a_function_of_the_user_still_finds(tmp_path: Path) -> None:
-    script = tmp_path / "script.py"
-    script.write_text("""
-import sys
-import numba, numpy as np
-from blocksim.kernels.common import jit
-
-@jit.entry_kernel
-def double(number):
-    return 2.0 * number
-
-assert double(1.5) == 3.0
-assert "scipy.linalg" not in sys.modules
-assert numba.njit(lambda a, b: a @ b)(np.eye(2), np.ones(2)).tolist() == [1.0, 1.0]
-assert "scipy.linalg" in sys.modules
-""")
-    environment = {**os.environ, "BLOCKSIM_CACHE_DIR": str(tmp_path / "cache")}
-    subprocess.run([sys.executable, script], check=True, timeout=120, env=environment)
-
-
 def chain() -> tuple[Any, Any, Any]:
     """Return kernels as a new process has them: two and the one that calls them."""
 
@@ -378,13 +347,3 @@ def test_numba_is_as_before_after_shortcuts_even_where_compiling_fails() -> None
     with pytest.raises(OSError, match="no room"):
         fail_in_shortcuts()
     assert before == (kinds.__hash__, calls.get_call_type, funcdesc.default_mangler)
-
-
-@pytest.mark.usefixtures("compiler")
-def test_operators_are_resolved_anew_for_other_types() -> None:
-    def twice(x: float) -> float:
-        return x + x
-
-    with shortcuts():
-        doubled = njit(twice)
-        assert [type(doubled(x)) for x in (1, 1.0, 1j)] == [int, float, complex]

@@ -14,8 +14,6 @@ from blocksim.kernels.common.mechanics import friction_coefficient
 from blocksim.kernels.explicit.history import change_contacts
 from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point
 from blocksim.kernels.explicit.laws import (
-    HERTZ_MINDLIN,
-    LINEAR,
     clip_to_cone,
     coulomb_limit,
     draw_same_spring,
@@ -207,6 +205,9 @@ def test_spring_and_dashpot_together_stay_within_the_cone(
     assert clipped == (force if abs(force) <= cone else pytest.approx(np.copysign(cone, force), rel=1e-14))
 
 
+STIFFNESS = 1e6  # N/m
+
+
 @given(
     old=st.floats(-1e-6, 1e-6), slip=st.floats(-1e-6, 1e-6), normal=st.floats(0.0, 1.0), speed=st.floats(-0.02, 0.02)
 )
@@ -218,35 +219,3 @@ def test_spring_of_the_same_stiffness_is_drawn_as_any_other(
     assert (spring, limit, slides) == expected[:3]
     assert lost == pytest.approx(expected[3], abs=1e-15 * STIFFNESS * 1e-12)
     assert slides or lost == 0.0
-
-
-DEEPEST = 1e-5  # m
-STIFFNESS = 1e6  # N/m, or N/m^1.5
-
-
-@pytest.mark.parametrize("law", [LINEAR, HERTZ_MINDLIN])
-@given(
-    path=st.lists(st.tuples(st.floats(1e-3, 1.0), st.floats(-2.0, 2.0)), min_size=1, max_size=15),
-    friction=st.floats(0.01, 2.0),
-)
-def test_shear_spring_never_gives_back_more_than_was_put_in(
-    law: int, path: list[tuple[float, float]], friction: float
-) -> None:
-    """Of one point that is led to overlaps (of the deepest one) and slips (of the longest spring there)."""
-    values = zeros(1, INTERACTION)[0]
-    values.static_friction, values.kinetic_friction, values.transition_speed = friction, friction, 1e-3
-    scale = friction * elastic_force(law, STIFFNESS, DEEPEST) * DEEPEST
-    spring = before = force = work = stored = 0.0
-    for share, slips in path:
-        normal = elastic_force(law, STIFFNESS, share * DEEPEST)
-        stiffness = 0.8 * tangent_stiffness(law, STIFFNESS, share * DEEPEST)
-        for slip in (0.0, slips * friction * normal / stiffness):
-            pulled, held = force, stored
-            spring, limit, _, lost = draw_spring(values, stiffness, before, spring, slip, 1.0, normal, 0.0)
-            force = clip_to_cone(values, stiffness * spring, limit, normal, 0.0)
-            before, stored, done = stiffness, 0.5 * stiffness * spring**2, 0.5 * (pulled + force) * slip
-            work += done
-            assert lost == pytest.approx(done - (stored - held), abs=1e-16)
-            assert lost >= -1e-15 * scale
-            assert work >= stored - 1e-14 * scale
-            assert abs(force) <= friction * normal * (1.0 + 1e-12)

@@ -147,27 +147,6 @@ def test_round_off_of_a_gap_does_not_choose_between_the_rules() -> None:
     assert [dense(scene).impulses.min() > 0.0 for scene in scenes] == [True, True]
 
 
-def test_tallies_have_what_impulses_take_from_blocks_that_meet_without_gravity() -> None:
-    blocks = pile(np.random.default_rng(1), 4, 2)  # some colour has a pack of more than one
-    scene = collided(posed(blocks, gravity=0.0, **{**EXACT, "velocity_sweeps": 3}))
-    bodies: Any = scene.world.bodies[:-1]
-
-    def kinetic() -> float:
-        vx, vy, spin = velocities(scene.contacts.states)[:-1].T
-        return float(0.5 * (bodies.mass * (vx**2 + vy**2) + bodies.inertia * spin**2).sum())
-
-    before = kinetic()
-    substep(scene, 0, 0, False, scene.contacts.impact_lanes)
-    tallies = scene.contacts.tallies
-    taken = float(tallies.impacts.sum() + tallies.friction.sum())
-    assert before - kinetic() == pytest.approx(taken, rel=1e-12)
-    assert tallies.impacts.sum() > 0.1 * before
-    all_of = dense(scene)
-    _, slip = slips(scene, all_of)
-    then = all_of.tangents @ velocities(scene.contacts.before).ravel()
-    assert float(tallies.friction.sum()) == pytest.approx(float(-0.5 * all_of.shears @ (slip + then)), rel=1e-9)
-
-
 HALF = 0.0125  # m, of a height
 SLIPPERY: dict[str, Any] = {"friction": 0.0, "ground_friction": 0.0, "substeps": 1, "velocity_tolerance": 1e-11}
 RESTITUTIONS = [0.0, 0.2, 0.5, 0.8, 1.0]
