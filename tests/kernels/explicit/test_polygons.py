@@ -15,7 +15,7 @@ from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.models.surface import near_slots
 from blocksim.kernels.explicit.sides import MOST_CORNERS, cone_of
-from blocksim.kernels.explicit.sliver_axes import nearest_axis
+from blocksim.kernels.explicit.sliver_axes import Axis, nearest_axis
 from blocksim.verification.scene import CaseScene
 
 if TYPE_CHECKING:
@@ -70,6 +70,52 @@ def struck(
     return run, before
 
 
+class Pair:
+    """Two free elastic polygons, of which the first is put anywhere."""
+
+    def __init__(self, one: Outline, two: Outline, law: str = "linear") -> None:
+        """Begin with the bodies beside one another, the second at (1, 1)."""
+        apart = sum(max(hypot(*corner) for corner in outline) for outline in (one, two))
+        bodies = [{"x": 1.0 - apart, "y": 1.0, "outline": one}, {"x": 1.0, "y": 1.0, "outline": two}]
+        scene = CaseScene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact={"law": law, "max_overlap": 2e-3})
+        self.world = scene.start().world
+        self.a: Any = self.world.bodies[0]
+        self.b: Any = self.world.bodies[1]
+        self.pair: Any = self.world.pairs[0]
+        self.pair.a, self.pair.b = 0, 1
+
+    def put(self, place: NDArray[np.float64]) -> Axis:
+        """Put the first body at x (m), y (m) and an angle (rad); return the axis on which it is nearest."""
+        self.a.x, self.a.y, self.a.angle = place
+        self.a.cos, self.a.sin = cos(place[2]), sin(place[2])
+        return nearest_axis(self.a, self.b, self.world.corners)
+
+    def force(self, place: NDArray[np.float64], *, remembers: bool = False) -> NDArray[np.float64]:
+        """Return the force (N) on the first body, and its torque (N m) over the radius."""
+        self.put(place)
+        if not remembers:
+            self.pair.active = self.pair.is_sliver = self.pair.duplicates = 0
+        renew_dashpots(self.pair)
+        self.pair.near = near_slots(self.world, 0, 1, RADIUS, self.world.candidates[0])
+        pair_forces(self.world, 0, 0.0)
+        action = self.world.action[0]
+        return np.array([action.fx, action.fy, action.torque_a / RADIUS])
+
+    def way(self, share: float, ends: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return a place where corners of both meet, and the way along the face of b that leads over it.
+
+        A face of the first body is tilted against it by a share of the cone.
+        """
+        sine = share * float(cone_of(self.a, self.b, self.world.corners))
+        at_a, at_b = (self.world.corners[int(body.first_corner) :] for body in (self.a, self.b))
+        side, corner = at_b[ends[1]], at_a[ends[0]]
+        turn = atan2(side.ny, side.nx) + pi - atan2(corner.ny, corner.nx) + sine
+        x, y = cos(turn) * corner.x - sin(turn) * corner.y, sin(turn) * corner.x + cos(turn) * corner.y
+        last = at_b[(ends[1] + 1) % int(self.b.corner_count)]
+        meet = [self.b.x + last.x - x - SHALLOW * side.nx, self.b.y + last.y - y - SHALLOW * side.ny, turn]
+        return np.array(meet), np.array([-side.ny, side.nx, 0.3])
+
+
 # shapes, and the power of the overlap in the energy of the law
 PAIRS = {
     "hexagons": (HEXAGON, HEXAGON, 2.0),
@@ -95,19 +141,14 @@ def past_corner(one: Outline, two: Outline, angle: float) -> tuple[NDArray[np.fl
 def test_energy_of_a_sliver_has_no_step_and_the_force_is_its_slope(name: str) -> None:
     """Along a way on which the nearest face changes: a step of the energy is no integral of a force."""
     one, two, power = PAIRS[name]
-    world = CaseScene([{"y": 1.0, "outline": one}, {"x": 1.0, "y": 1.0, "outline": two}], gravity=0.0).start().world
-    a: Any = world.bodies[0]
-    b: Any = world.bodies[1]
-    faces = set()
+    pair, faces = Pair(one, two), set()
     for angle in (0.0, 0.03, 0.1):
         places, way = past_corner(one, two, angle)
         energies, slopes = np.zeros(PLACES), np.zeros(PLACES)
         for i, place in enumerate(places):
-            a.x, a.y, a.angle = place
-            a.cos, a.sin = cos(place[2]), sin(place[2])
-            nearest = nearest_axis(a, b, world.corners)
+            nearest = pair.put(place)
             if nearest.depth > 0.0:
-                found = slivers.mean_energy(nearest, power, a, b, world.corners)
+                found = slivers.mean_energy(nearest, power, pair.a, pair.b, pair.world.corners)
                 energies[i] = found.value
                 slopes[i] = found.x * way[0] + found.y * way[1] + found.turn * way[2]
                 faces.add((angle, nearest.of_b, nearest.face))
@@ -126,56 +167,6 @@ SHAPES = {"triangle": regular(3), "square": regular(4), "hexagon": regular(6), "
 MEETINGS = [("triangle", "square"), ("square", "square"), ("hexagon", "hexagon"), ("hexagon", "16-gon")]
 MEETINGS += [("16-gon", "16-gon"), ("rough", "16-gon"), ("rough", "rough"), ("triangle", "16-gon")]
 QUICKEST = ("triangle", "square", "linear")
-
-
-class Pair:
-    """Two free elastic polygons, of which the first is put anywhere, without any history."""
-
-    def __init__(self, one: str, two: str, law: str) -> None:
-        """Begin with the bodies apart."""
-        self.outlines = SHAPES[one], SHAPES[two]
-        bodies = [{"y": 1.0, "outline": self.outlines[0]}, {"x": 2.0 * RADIUS, "y": 1.0, "outline": self.outlines[1]}]
-        scene = CaseScene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact={"law": law, "max_overlap": 2e-3})
-        self.world = scene.start().world
-        self.a: Any = self.world.bodies[0]
-        self.b: Any = self.world.bodies[1]
-        self.pair: Any = self.world.pairs[0]
-        self.pair.a, self.pair.b = 0, 1
-
-    def put(self, place: NDArray[np.float64]) -> None:
-        """Put the first body at x (m), y (m) and an angle (rad)."""
-        self.a.x, self.a.y, self.a.angle = place
-        self.a.cos, self.a.sin = cos(place[2]), sin(place[2])
-
-    def force(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the force (N) on the first body, and its torque (N m) over the radius."""
-        self.put(place)
-        self.pair.active = self.pair.is_sliver = self.pair.duplicates = 0
-        renew_dashpots(self.pair)
-        self.pair.near = near_slots(self.world, 0, 1, RADIUS, self.world.candidates[0])
-        pair_forces(self.world, 0, 0.0)
-        action = self.world.action[0]
-        return np.array([action.fx, action.fy, action.torque_a / RADIUS])
-
-    def features(self, place: NDArray[np.float64]) -> tuple[bool, int, int]:
-        """Return the nearest face and corner."""
-        self.put(place)
-        nearest = nearest_axis(self.a, self.b, self.world.corners)
-        return nearest.of_b, int(nearest.face), int(nearest.corner)
-
-    def way(self, share: float, ends: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return a place where corners of both meet, and the way along the face of b that leads over it.
-
-        A face of the first body is tilted against it by a share of the cone.
-        """
-        sine = share * float(cone_of(self.a, self.b, self.world.corners))
-        at_a, at_b = (self.world.corners[int(body.first_corner) :] for body in (self.a, self.b))
-        side, corner = at_b[ends[1]], at_a[ends[0]]
-        turn = atan2(side.ny, side.nx) + pi - atan2(corner.ny, corner.nx) + sine
-        x, y = cos(turn) * corner.x - sin(turn) * corner.y, sin(turn) * corner.x + cos(turn) * corner.y
-        last = at_b[(ends[1] + 1) % int(self.b.corner_count)]
-        meet = [self.b.x + last.x - x - SHALLOW * side.nx, self.b.y + last.y - y - SHALLOW * side.ny, turn]
-        return np.array(meet), np.array([-side.ny, side.nx, 0.3])
 
 
 def largest_jump(pair: Pair, low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
@@ -199,14 +190,14 @@ def test_force_does_not_jump_where_corners_pass_one_another(one: str, two: str, 
     """Faces that are parallel, to within 0.01 rad, may turn the force by as much: so it is between rectangles."""
     if pace > 1 and (one, two, law) != QUICKEST:
         pytest.skip("takes half a minute without the compiler")
-    pair = Pair(one, two, law)
-    seen = set()
+    pair, seen = Pair(SHAPES[one], SHAPES[two], law), set()
     for share in (0.15, 0.3, 0.5, 0.8):
         for ends in ((0, 0), (1, 1)):
             middle, way = pair.way(share, ends)
             places = middle + np.linspace(-PAST, PAST, STOPS)[:, np.newaxis] * way
             forces = [pair.force(place) for place in places]
-            seen |= {(share, *pair.features(place)) for place, force in zip(places, forces, strict=True) if force.any()}
+            nearest = [pair.put(place) for place, force in zip(places, forces, strict=True) if force.any()]
+            seen |= {(share, one.of_b, int(one.face), int(one.corner)) for one in nearest}
             for k in range(STOPS - 1):
                 if np.linalg.norm(forces[k + 1] - forces[k]) > STEEP * max(map(np.linalg.norm, forces[k : k + 2])):
                     assert largest_jump(pair, places[k], places[k + 1]) < FLAT
@@ -257,22 +248,11 @@ def forces_along(ways: NDArray[np.float64], law: str, tilt: float) -> NDArray[np
     """
     turn = pi / 16
     high = RADIUS * cos(turn)
-    bodies = [{"y": 1.0 + 2.0 * high, "outline": SIXTEEN, "angle": turn}, {"y": 1.0, "outline": SIXTEEN, "angle": turn}]
-    contact: dict[str, object] = {"law": law, "max_overlap": 10.0 * DEEP}
-    world: Any = CaseScene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact=contact).start().world
-    a, b, pair = world.bodies[0], world.bodies[1], world.pairs[0]
-    pair.a, pair.b = 0, 1
-    sine = tilt * float(flat_within(cone_of(a, b, world.corners)))
-    forces = []
-    for way in ways:
-        a.x, a.y, a.angle = way * DEEP - high * sine, 1.0 + 2.0 * high - DEEP, turn + sine
-        a.cos, a.sin = cos(a.angle), sin(a.angle)
-        renew_dashpots(pair)
-        pair.near = near_slots(world, 0, 1, RADIUS, world.candidates[0])
-        pair_forces(world, 0, 0.0)
-        action = world.action[0]
-        forces.append([action.fx, action.fy, action.torque_a / RADIUS])
-    return np.array(forces)
+    pair = Pair(SIXTEEN, SIXTEEN, law)
+    pair.b.angle, pair.b.cos, pair.b.sin = turn, cos(turn), sin(turn)
+    sine = tilt * float(flat_within(cone_of(pair.a, pair.b, pair.world.corners)))
+    places = [(pair.b.x + way * DEEP - high * sine, 1.0 + 2.0 * high - DEEP, turn + sine) for way in ways]
+    return np.array([pair.force(np.array(place), remembers=True) for place in places])
 
 
 @pytest.mark.parametrize("tilt", [-0.9, 0.5])
