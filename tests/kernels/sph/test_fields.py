@@ -87,7 +87,7 @@ def test_sums_over_particles_are_their_equations(kernel: KernelName) -> None:
     m, rho, places = particles.sources.mass, particles.sources.density, particles.sources.positions
     values = np.random.default_rng(1).normal(size=m.size)
     _, slopes = values_and_slopes(particles, places)
-    pairs = {
+    pairs: dict[Any, Any] = {
         "plain": values / rho * np.ones_like(rho)[:, None],
         "symmetric": rho[:, None] * (values[:, None] / rho[:, None] ** 2 + values / rho**2),
         "difference": (values - values[:, None]) / rho,
