@@ -124,7 +124,7 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
 }
 
 MODULES = dict.fromkeys(("animate", "report", "export"), "plot")
-MODULES |= {"schema": "new", "fragility": "limit", "capacity": "limit", "sensitivity": "calibrate", "bench": "verify"}
+MODULES |= {"schema": "new", "fragility": "limit", "bench": "verify"}
 GROUPS = {  # heads of the list in `blocksim --help`
     "Run": ("new", "run", "schema"),
     "Look": ("plot", "animate", "report", "export"),
