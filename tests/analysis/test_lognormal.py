@@ -19,19 +19,6 @@ def found(failed: list[int], members: int = MEMBERS) -> Curve | NoCurve:
     return fit(Counts.of(X.tolist(), failed, [members] * len(X)))
 
 
-def test_intervals_of_median_dispersion_and_curve_cover_what_they_say() -> None:
-    stream, draws = np.random.default_rng(1), 200
-    hits = np.zeros(3)
-    for _ in range(draws):
-        one = found(stream.binomial(MEMBERS, P).tolist())
-        assert isinstance(one, Curve)
-        low, high = one.band(X[2:3])
-        truths = (MEDIAN, one.median_interval), (DISPERSION, one.dispersion_interval), (P[2], (low[0], high[0]))
-        hits += [ends[0] <= truth <= ends[1] for truth, ends in truths]
-    # four standard deviations of 200 draws that each hit with 0.95
-    assert np.abs(hits / draws - 0.95).max() < 4.0 * math.sqrt(0.95 * 0.05 / draws)
-
-
 def test_the_curve_is_the_most_likely_one_and_its_intervals_are_those_of_the_profile() -> None:
     one = found(DRAWN)
     assert isinstance(one, Curve)

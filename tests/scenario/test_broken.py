@@ -142,7 +142,6 @@ def test_files_that_are_not_there_and_data_from_python(
 
 
 SWEPT = (SCENARIOS / "three_blocks.toml").read_text() + '[sweep]\n"time.end" = [1, 2]\n'
-LINES = [line for line in SWEPT.split("\n") if line and not line.startswith("#")]
 KEYS = ("time.end", "structures.0", "structures.0.count", "blocks", "friction.block_block")
 ODD_VALUES = [
     *("0", "-1", "1e308", "-1e308", "1e-320", "nan", "-inf", "true", "2020-10-14", "07:32:00", "0x10", "1_0"),
@@ -164,13 +163,6 @@ def check(text: str, settings: list[str] | None = None) -> None:
     for problem in problems:
         assert problem.caret_start + problem.caret_length <= max(1, len(problem.line_text)) + 1
         assert "\n" not in problem.where + problem.message + problem.line_text
-
-
-@given(st.integers(0, len(LINES) - 1), st.sampled_from(ODD_VALUES), st.booleans())
-def test_any_value_anywhere(number: int, value: str, again: bool) -> None:
-    key = LINES[number].split("=")[0]
-    line = f"{key}= {value}"
-    check("\n".join([*LINES[:number], line, *([line] if again else []), *LINES[number + 1 :]]))
 
 
 @given(

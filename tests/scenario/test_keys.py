@@ -3,17 +3,13 @@
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.scenario.document import Span, locate
-from blocksim.scenario.models.contact import PairFriction
-from blocksim.scenario.models.motion import FromTable
-from blocksim.scenario.overrides import KeyPath, field_at, format_key, is_known, parse_key, table_at
+from blocksim.scenario.overrides import KeyPath, format_key, is_known, parse_key
 from blocksim.scenario.spelling import USUAL, meant_word, nearest
-from blocksim.scenario.structures.masonry import Stack
 from tests.golden import Golden
 from tests.scenario.conftest import SCENARIOS
 
@@ -48,16 +44,6 @@ def test_what_is_no_key(text: str) -> None:
 @given(st.lists(st.text(st.characters(max_codepoint=0xFFFF, exclude_categories=["Cs"])), min_size=1, max_size=4))
 def test_a_key_that_was_written_is_read_again(parts: list[str]) -> None:
     assert parse_key(format_key(parts)) == tuple(parts)
-
-
-def test_the_model_of_a_table_depends_on_its_kind_and_a_field_is_found_by_its_name_in_the_file() -> None:
-    assert [table_at(("structures", place), DATA) for place in range(3)] == [Stack, None, None]
-    assert table_at(("friction", "block_ground"), DATA) is PairFriction
-    assert table_at(("time", "end"), DATA) is None
-    motions: tuple[Any, ...] = ({"motion": {"kind": "table"}}, {"motion": {"kind": "none"}}, DATA)
-    assert [table_at(("motion",), data) for data in motions] == [FromTable, None, None]
-    assert field_at(("schema",), DATA) is not None
-    assert field_at(("schema_version",), DATA) is field_at((), DATA) is None
 
 
 KNOWN = """time.end contact.restitution contact.restitution.block_ground blocks.brick blocks.brick.length

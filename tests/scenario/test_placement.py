@@ -21,10 +21,6 @@ from tests.scenario.conftest import MATERIAL, SCENARIOS, data_of, edited, read
 BRICK = {"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "aluminium"}
 
 
-def scenario_data(**tables: object) -> dict[str, object]:
-    return data_of(materials={"aluminium": MATERIAL}, blocks={"brick": BRICK}, **tables)
-
-
 def test_the_three_blocks_stand_as_in_the_experiment() -> None:
     bodies = place_bodies(load_scenario(SCENARIOS / "three_blocks_nominal.toml"))
     assert [body.name for body in bodies] == ["1", "2", "3"]
@@ -34,19 +30,6 @@ def test_the_three_blocks_stand_as_in_the_experiment() -> None:
     assert bodies[0].density == pytest.approx(2721.7, abs=0.05)
     assert bodies[0].mass == pytest.approx(0.10887, abs=5e-6)
     assert bodies[0].inertia == pytest.approx(0.10887 * (0.032**2 + 0.05**2) / 12, rel=1e-4)
-
-
-def test_structures_come_before_bodies_and_numbers_run_on() -> None:
-    stack = {"kind": "stack", "block": "brick", "count": 2}
-    moved = {"x": "1 m", "y": "1 m", "angle": "30 deg", "velocity": ["1 m/s", 0], "spin": "180 deg/s"}
-    loose = [{"block": "brick", **moved}, {"block": "brick", "x": 2, "y": 2, "name": "wall", "fixed": True}]
-    data = scenario_data(bodies=loose, structures=[stack, {**stack, "left": "0.1 m"}])
-    bodies = place_bodies(scenario_from_mapping(data))
-    assert [body.name for body in bodies] == ["1", "2", "3", "4", "5", "wall"]
-    moving, wall = bodies[4:]
-    assert (moving.x, moving.y, moving.angle) == (1.0, 1.0, math.radians(30))
-    assert (moving.vx, moving.vy, moving.spin, moving.fixed) == (1.0, 0.0, math.pi, False)
-    assert (wall.x, wall.fixed, wall.spin) == (2.0, True, 0.0)
 
 
 def test_a_scenario_is_placed_once_and_its_bodies_go_with_it() -> None:

@@ -3,13 +3,11 @@
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments, scenario_from_mapping
 from blocksim.scenario.events import Joint, joint_between
@@ -24,35 +22,6 @@ def scenario(profile: Sequence[Point] | None = None, walls: Sequence[Mapping[str
     ground = {} if profile is None else {"ground": {"profile": profile}}
     bodies = [{"block": "brick", "x": 0, "y": 500}]
     return scenario_from_mapping(data_of(bodies=bodies, walls=walls, **ground))
-
-
-def ends(segment: PlacedSegment) -> tuple[Point, Point]:
-    return (segment.x0, segment.y0), (segment.x1, segment.y1)
-
-
-PROFILES = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 1.5]), st.floats(-5, 5)), min_size=2, max_size=8)
-
-
-@given(PROFILES)
-def test_every_joint_is_a_valley_of_both_pieces_or_an_edge_of_one(steps: list[tuple[float, float]]) -> None:
-    points: list[Point] = []
-    x = 0.0
-    for step, y in steps:
-        x += step or (0.5 if len(points) > 1 and points[-2][0] == x else 0.0)  # one vertical piece at a time
-        if not points or math.dist(points[-1], (x, y)) > 0.01:
-            points.append((x, y))
-    if len(points) < 2:
-        return
-    pieces = place_segments(scenario(points))
-    for one, other in pairwise(pieces):
-        assert ends(one)[1] == ends(other)[0]
-        turn = math.remainder(
-            math.atan2(other.y1 - other.y0, other.x1 - other.x0) - math.atan2(one.y1 - one.y0, one.x1 - one.x0),
-            math.tau,
-        )
-        is_valley = turn > 0
-        assert (one.extends_end, other.extends_start) == (is_valley, is_valley)
-        assert (one.touches_end, other.touches_start) == (not is_valley, False)
 
 
 def test_the_height_of_the_surface_is_zero_on_flat_ground_which_is_no_segment() -> None:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.errors import InvalidInputError, OutputExistsError
+from blocksim.errors import OutputExistsError
 from blocksim.scenario import Document, Sweep, scenario_hash
 from blocksim.scenario.models.study import Normal, Uniform
-from blocksim.study.calibrate import scenario_text, toml_value
+from blocksim.study.calibrate import scenario_text
 from blocksim.study.calibrate_plan import (
     FIRST,
     FRESH,
@@ -205,15 +205,6 @@ def test_journal_of_another_plan_or_of_a_calibration_that_runs_is_refused_and_ke
     assert journal.read_bytes() == before
 
 
-@pytest.mark.parametrize("content", [b"not a journal\n", b"[1, 2]\n", b'{"op_code": 4}\n', b"\xff\xfe\n"])
-def test_file_that_is_no_journal_is_refused_and_kept(tmp_path: Path, content: bytes) -> None:
-    journal = tmp_path / "journal"
-    journal.write_bytes(content)
-    with pytest.raises(InvalidInputError, match="not the journal of a calibration"), open_journal(journal, PLAN):
-        pass
-    assert journal.read_bytes() == content
-
-
 WRITTEN: dict[str, tuple[str, dict[str, object], list[str]]] = {
     "values": ("three_blocks", {KINETIC: 0.2, "contact.restitution": 0.25}, []),
     "bare number": ("three_blocks_nominal", {KINETIC: 0.2, "contact.restitution.block_ground": 0.1}, []),
@@ -247,16 +238,3 @@ def test_text_that_cannot_be_edited_is_written_out_resolved(tmp_path: Path) -> N
     built = Document.parse(found, folder=tmp_path).build()
     assert scenario_hash(built) == scenario_hash(document.with_values(values).build())
     assert built.provenance == {"friction.block_ground": "calibrated"}
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.1923, "0.1923"),
-        ("10 mm", '"10 mm"'),
-        ({"static": 0.3, "a b": (1, 2.5)}, '{ static = 0.3, "a b" = [1, 2.5] }'),
-        (True, "true"),
-    ],
-)
-def test_values_are_written_on_one_line(value: object, text: str) -> None:
-    assert toml_value(value) == text

@@ -18,7 +18,7 @@ from blocksim.study.criterion import Stability
 from blocksim.study.executors.processes import pool_of
 from blocksim.study.limit import limit as searched, limit_curve
 from blocksim.study.limit_answer import CurveAnswer, LimitAnswer
-from blocksim.study.limit_plan import is_sustained, read_limit, variants
+from blocksim.study.limit_plan import is_sustained, read_limit
 from blocksim.study.pictures import plot
 from blocksim.study.report import report
 from blocksim.study.run_folder import read_run
@@ -105,14 +105,6 @@ def test_whole_numbers_of_blocks_are_searched_as_such(tmp_path: Path) -> None:
     (change,) = found.limits
     assert (change.low, change.high) == (5.0, 6.0)
     assert found.brackets[0].above.outcome == "fell"
-
-
-def test_both_laws_are_the_same_scene_without_what_only_one_of_them_knows() -> None:
-    document = Document.from_mapping(block_on_a_slope(SQUAT, substeps=2, step=1e-3))
-    both = {name: one.build() for name, one in variants(document, both_laws=True).items()}
-    assert list(both) == ["springs", "rigid contacts"]
-    assert both["rigid contacts"] == document.build()
-    assert (both["springs"].time.scheme, both["springs"].time.step) == ("explicit", "auto")
 
 
 def unsettled(scene: dict[str, Any]) -> dict[str, Any]:

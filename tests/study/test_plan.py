@@ -62,16 +62,6 @@ def test_impossible_combination_is_kept_with_its_reason_beside_the_scenario_that
     assert "kinetic friction 0.9 is above static friction 0.31" in bad.problem
 
 
-def test_cases_are_made_when_they_are_asked_for(nominal: Document) -> None:
-    friction, ends = ({"from": low, "to": high, "count": 1000} for low, high in ((0.1, 0.3), (1.0, 2.0)))
-    many = cases(nominal, {KINETIC: friction, "time.end": ends})
-    assert len(many) == 1_000_000
-    last = many[-1].scenario
-    assert last is not None
-    assert (last.friction.block_block.kinetic, last.time.end, last.sweep) == (0.3, 2.0, None)
-    assert [case.settings["time.end"] for case in (many[0], many[1])] == [1.0, 1.001001001001001]
-
-
 @pytest.mark.parametrize("friction", [0.31, {"static": 0.31, "kinetic_ratio": 0.5}, None])
 def test_a_resolved_sweep_has_the_same_cases(nominal: Document, friction: object) -> None:
     """Kinetic friction that follows the static one does so in the resolved file too."""
@@ -256,11 +246,3 @@ def test_other_keys_their_order_and_more_samples_leave_values_as_they_are(nomina
         assert column(sweep_of(nominal, mode, {SCALE: UNIT}, samples=40), SCALE)[:16] == alone
     quoted = sweep_of(nominal, mode, {'contact."stiffness_scale"': UNIT}, samples=16)
     assert column(quoted, 'contact."stiffness_scale"') == alone
-
-
-@pytest.mark.parametrize("mode", SAMPLED)
-def test_levels_are_equally_likely(nominal: Document, mode: str) -> None:
-    drawn = column(sweep_of(nominal, mode, {"time.scheme": ["explicit", "nonsmooth"]}, samples=1024), "time.scheme")
-    spread = 4 * math.sqrt(1024) / 2 if mode == "normal" else 0
-    assert abs(drawn.count("explicit") - 512) <= spread
-    assert drawn.count("explicit") + drawn.count("nonsmooth") == 1024

@@ -4,17 +4,12 @@ import math
 import zlib
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
 import pytest
 
-from blocksim.analysis.compare import compare_final
-from blocksim.analysis.experiment import load_table
 from blocksim.scenario import Document
 from blocksim.study.manifest import CaseIndex, Entry, Manifest, read_entries, short_hash
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.rows import Head, Range, Ranges, as_cell, heads_of
-from tests.study.conftest import SCENARIOS
 from tests.study.plans import OVERLAP, TILT, cases, plan_of
 
 FRICTION = "friction.block_block"
@@ -56,30 +51,6 @@ def test_drawn_angles_are_numbers_in_the_unit_of_their_range(nominal: Document) 
 def test_head_is_read_back_and_bare_keys_of_older_tables_too() -> None:
     assert (Head.read("ground.tilt [deg]"), Head.read("ground.tilt")) == (Head(TILT, "deg"), Head(TILT))
     assert Head(TILT, "deg").cell(3.141592653589793) == pytest.approx(180.0)
-
-
-TABLE = SCENARIOS / "experiments" / "three_blocks.csv"
-NAMES = ("1", "2", "3")
-
-
-def final(rng: np.random.Generator) -> dict[str, list[object]]:
-    x = np.array([16.0, 75.0, 132.0]) + rng.normal(0.0, 0.4, 3) * [1.0, 6.0, 6.0]
-    rotation = np.array([0.0, -90.0, -90.0]) + rng.normal(0.0, 2.0, 3)
-    return {"block": list(NAMES), "x_mm": x.tolist(), "rotation_deg": rotation.tolist()}
-
-
-def row_of(columns: dict[str, list[object]]) -> dict[str, object]:
-    return {f"{name}.{key}": columns[key][i] for key in ("x_mm", "rotation_deg") for i, name in enumerate(NAMES)}
-
-
-def test_rows_and_tables_are_judged_as_compare_does() -> None:
-    rng, measured, ranges = np.random.default_rng(1), load_table(TABLE), Ranges.read(TABLE)
-    finals = [final(rng) for _ in range(200)]
-    expected = [compare_final(one, measured).inside for one in finals]
-    assert 20 < sum(expected) < 180
-    rows = [row_of(one) for one in finals]
-    assert [ranges.hold(row) for row in rows] == expected
-    assert ranges.inside(pd.DataFrame(rows)).tolist() == expected
 
 
 def test_block_without_a_position_is_not_inside(tmp_path: Path) -> None:

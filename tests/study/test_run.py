@@ -1,6 +1,5 @@
 """One run, from Python and as it lies on the disk; compared with an experiment, as sweeps are."""
 
-import json
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ import pytest
 
 import blocksim
 from blocksim.analysis.compare import Comparison
-from blocksim.analysis.metrics import Judgement, Settings
+from blocksim.analysis.metrics import Settings
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document, Scenario, load_scenario
 from blocksim.simulation import Result, simulate_into
@@ -18,7 +17,7 @@ from blocksim.simulation.instruments import bytes_of_series
 from blocksim.study.compare import compare, compare_run, compare_sweep
 from blocksim.study.manifest import SweepResult
 from blocksim.study.run import run
-from blocksim.study.run_folder import find_run, read_run
+from blocksim.study.run_folder import find_run
 from blocksim.study.sweep import sweep
 from blocksim.study.verify import verify_run
 from blocksim.world.describe import describe
@@ -88,20 +87,6 @@ def swept(nominal: Document, tmp_path_factory: pytest.TempPathFactory) -> SweepR
     return sweep(nominal, vary, out=tmp_path_factory.mktemp("sweep") / "out", jobs=1)
 
 
-def test_sweep_and_its_folder_are_judged_alike_and_a_table_alone_needs_an_experiment(
-    swept: SweepResult, tmp_path: Path
-) -> None:
-    found = [compare(swept), compare(swept.folder), compare(str(swept.folder), PAPER)]
-    assert all(isinstance(one, Judgement) and one.members == 2 for one in found)
-    first, second, third = (one.to_dict() for one in found)
-    assert first == second
-    assert first["metrics"] == third["metrics"]
-    swept.table.to_csv(tmp_path / "sweep.csv", index=False)
-    with pytest.raises(InputMissingError, match="--experiment"):
-        compare_sweep(tmp_path)
-    assert compare_sweep(tmp_path, PAPER).members == 2
-
-
 def test_member_of_a_sweep_is_judged_as_a_run_of_its_own_and_by_the_settings(swept: SweepResult, kept: Result) -> None:
     found, alone = compare_sweep(swept), compare(kept)
     assert isinstance(alone, Comparison)
@@ -163,32 +148,6 @@ def test_size_of_a_run_is_forecast_within_a_factor_of_two(
     stored = sum(path.stat().st_size for path in tmp_path.iterdir() if path.name.startswith(("run.h5", "probe-")))
     told = described.bytes + bytes_of_series(scenario, described.steps, described.step, 14)
     assert 0.5 * stored < told < 2.0 * stored
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """Give the folder of a short finished run."""
-    simulate_into(load_scenario(SCENARIOS / "bounce.toml", BRIEF), tmp_path / "run")
-    return tmp_path / "run"
-
-
-def test_what_did_not_finish_and_missing_and_damaged_frames_are_reported(folder: Path, golden: Golden) -> None:
-    summary = json.loads((folder / "run.json").read_text())
-    told = []
-    for status in ("failed", "interrupted"):
-        (folder / "run.json").write_text(json.dumps({**summary, "status": status, "reason": "why"}))
-        told.append(read_run(folder).remark)
-    (folder / "run.json").write_text("{")
-    told.append(read_run(folder).remark)
-    (folder / "run.json").unlink()
-    told.append(read_run(folder).remark)
-    golden("\n".join(told))
-    (folder / "run.h5").write_bytes((folder / "run.h5").read_bytes()[:2000])
-    with pytest.raises(InvalidInputError, match=r"run\.h5: not a"):
-        read_run(folder)
-    (folder / "run.h5").unlink()
-    with pytest.raises(InputMissingError, match=r"no run\.h5"):
-        read_run(folder)
 
 
 def test_a_changed_sample_is_found_when_a_run_is_verified(tmp_path: Path) -> None:

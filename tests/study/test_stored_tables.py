@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario import Document, Scenario
-from blocksim.study.pictures import plot, read_indices, read_sweep_data, unit_of
+from blocksim.scenario import Document
+from blocksim.study.pictures import plot, read_indices, read_sweep_data
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.sweep import sweep
 from blocksim.study.sweep_folder import prepare
-from blocksim.view.sweeps.data import SweepData, value_axis
+from blocksim.view.sweeps.data import SweepData
 from tests.study.plans import OVERLAP, TILT
 
 ENDS = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")
@@ -49,19 +49,6 @@ def test_values_are_in_si_and_keep_the_unit_that_was_typed(quick: Document, tmp_
         drawn = (tmp_path / f"{kind}.svg").read_text()
         assert "<!-- structures.0.overlap (cm) -->" in drawn
         assert f"<!-- {second} -->" in drawn
-
-
-def test_refined_settings_are_drawn_with_their_units_and_friction_angles_in_degrees(
-    nominal: Document, scenario: Scenario, tmp_path: Path
-) -> None:
-    units = {key: unit_of(scenario, key) for key in ("contact.particle_spacing", "time.safety", "time.step")}
-    assert units == {"contact.particle_spacing": "m", "time.safety": "", "time.step": "s"}
-    rows = [f"{angle},{ended(74.0, 130.0)}" for angle in (20.0, 30.0)]
-    vary: dict[str, Values] = {"friction.block_block": ["20 deg", "30 deg"]}
-    (friction,) = stored(nominal, tmp_path, vary, rows, ("friction.block_block [deg]",)).inputs
-    axis = value_axis(friction.values, friction.key, friction.unit, typed=friction.typed)
-    assert axis.label.endswith("block_block (deg)")
-    assert friction.label(friction.values[0]) == "20 deg"
 
 
 def test_words_become_levels_and_keys_keep_their_order_but_those_of_one_value(

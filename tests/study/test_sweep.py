@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError
+from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document, load_scenario
 from blocksim.simulation.files import is_resolved
 from blocksim.simulation.observables import table_columns
@@ -82,16 +82,22 @@ def test_folder_holds_plan_table_and_manifest_and_the_plan_repeats_the_sweep(
     assert other.parent == folder.parent == Path("results/three_blocks_nonsmooth")
 
 
-def test_called_again_it_runs_only_what_is_missing(quick: Document, tmp_path: Path) -> None:
-    vary = {KINETIC: [0.2, 0.22, 0.25]}
-    sweep(quick, vary, out=tmp_path)
-    whole, table = lines(tmp_path), (tmp_path / "sweep.csv").read_bytes()
-    (tmp_path / "manifest.jsonl").write_text(whole[2] + "\n" + whole[0][:-20])  # the last one torn
-    (tmp_path / "sweep.csv").unlink()
-    sweep(quick, vary, out=tmp_path)
-    assert sorted(json.loads(line)["number"] for line in lines(tmp_path) if line in whole) == [0, 1, 2]
-    assert len(lines(tmp_path)) == 4
-    assert (tmp_path / "sweep.csv").read_bytes() == table
+def test_stopped_or_torn_it_goes_on_with_what_is_missing(quick: Document, tmp_path: Path) -> None:
+    def stop(done: int, *_: object) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    vary = {KINETIC: [0.1 + 0.001 * k for k in range(120)]}
+    sweep(quick, vary, out=tmp_path / "whole")
+    table = (tmp_path / "whole" / "sweep.csv").read_bytes()
+    with pytest.raises(StoppedEarlyError, match="of 120 cases done; rerun the command to finish"):
+        sweep(quick, vary, jobs=1, out=tmp_path / "cut", on_row=stop)
+    some = lines(tmp_path / "cut")
+    assert len(read_sweep(tmp_path / "cut").table) == len(some) < 120
+    (tmp_path / "cut" / "manifest.jsonl").write_text("\n".join(some)[:-20])
+    sweep(quick, vary, out=tmp_path / "cut")
+    assert len(lines(tmp_path / "cut")) == 121
+    assert (tmp_path / "cut" / "sweep.csv").read_bytes() == table
 
 
 def test_a_record_that_was_edited_since_is_not_taken_for_the_one_that_was_run(tmp_path: Path) -> None:
@@ -132,21 +138,6 @@ def test_failed_case_is_run_again_only_when_asked_and_ends_a_sweep_that_is_to_fa
 
 def content(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
-
-
-def test_other_sweep_in_the_folder_is_not_mixed_in_and_overwriting_runs_everything_again(
-    quick: Document, tmp_path: Path
-) -> None:
-    sweep(quick, TWO, out=tmp_path)
-    before = content(tmp_path)
-    with pytest.raises(OutputExistsError, match="contains another sweep; --overwrite"):
-        sweep(quick, {KINETIC: [0.1]}, out=tmp_path)
-    assert content(tmp_path) == before
-    sweep(quick, TWO, out=tmp_path, overwrite=True)
-    assert len(lines(tmp_path)) == 2
-    assert (tmp_path / "timings.csv").read_bytes() != before[tmp_path / "timings.csv"]
-    result = sweep(quick, {KINETIC: [0.1]}, out=tmp_path, overwrite=True)
-    assert result.table[KINETIC].tolist() == [0.1]
 
 
 def test_running_sweep_and_foreign_folder_are_left_alone(quick: Document, tmp_path: Path) -> None:
@@ -325,15 +316,6 @@ def test_rubbish_for_a_sweep_table_and_a_missing_one_are_refused(tmp_path: Path,
     (tmp_path / "sweep.csv").write_text(text)
     with pytest.raises(InvalidInputError, match=r"sweep\.csv: not the table of a sweep"):
         read_sweep(tmp_path)
-
-
-def test_sweep_does_what_shards_have_left(quick: Document, tmp_path: Path) -> None:
-    vary = {KINETIC: [0.1 + 0.02 * k for k in range(10)]}
-    sweep(quick, vary, out=tmp_path / "one")
-    sweep(quick, vary, out=tmp_path / "two", shard=Shard(0, 2))
-    sweep(quick, vary, out=tmp_path / "two")
-    assert len(lines(tmp_path / "two")) == 5
-    assert (tmp_path / "two" / "sweep.csv").read_bytes() == (tmp_path / "one" / "sweep.csv").read_bytes()
 
 
 def test_case_that_was_retried_elsewhere_counts_as_finished(quick: Document, tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """Every executor gives the same rows, in batches of any size, and in folders; a pool ends with whoever started it."""
 
-import logging
 import os
 import signal
 import subprocess
@@ -19,8 +18,7 @@ from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.results import read_summary
 from blocksim.study import executors as batches
 from blocksim.study.executors import GROWTH, MOST, BatchSize, Execution, RunSetting, Task, load_executor, take
-from blocksim.study.executors.dask import silence
-from blocksim.study.executors.ensemble import BATCH, rows_of, run_case, run_members
+from blocksim.study.executors.ensemble import rows_of, run_case, run_members
 from blocksim.study.manifest import Shard
 from blocksim.study.plan import Values
 from blocksim.study.run import run
@@ -176,20 +174,6 @@ def test_a_script_without_a_main_guard_is_told_so_whatever_study_it_begins(monke
         Execution(executor="processes").ready()
 
 
-def test_dask_is_quiet_while_a_sweep_uses_it_and_not_longer(capsys: pytest.CaptureFixture[str]) -> None:
-    logger = logging.getLogger("distributed.client")
-    handler = logging.StreamHandler(sys.stderr)
-    logger.addHandler(handler)
-    try:
-        with silence():
-            logger.error("Traceback: connection refused")
-        assert capsys.readouterr().err == ""
-        logger.error("something else")
-        assert capsys.readouterr().err == "something else\n"
-    finally:
-        logger.removeHandler(handler)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("kill", [(), ("kill",)])
 def test_cluster_gives_the_same_table_also_when_a_worker_dies(tmp_path: Path, kill: tuple[str, ...]) -> None:
@@ -227,14 +211,6 @@ def test_members_end_as_runs_of_their_own_whatever_fails_beside_them(slide: Docu
     assert [member.final for member in members] == [ends[0], None, None, None, ends[1]]
 
 
-def test_members_keep_their_order_beyond_a_batch(slide: Document) -> None:
-    ends = [0.001 + 1e-5 * number for number in range(BATCH + 3)]
-    finals = [member.final for member in run_members(slide, ({"time.end": end} for end in ends))]
-    places = [final["x_mm"][0] for final in finals if final is not None]
-    assert len(places) == len(ends)
-    assert places == sorted(places)
-
-
 def test_blocks_that_settled_have_moved_from_where_they_settled_together_and_in_folders(
     slide: Document, tmp_path: Path
 ) -> None:
@@ -262,12 +238,3 @@ def test_interrupted_case_continues_where_it_can(nominal: Document, tmp_path: Pa
     assert parts == (() if lost else (stopped.summary.steps,))
     ends = [(tmp_path / name / files.FINAL).read_bytes() for name in ("whole", "case")]
     assert ends[0] == ends[1]
-
-
-def test_finished_case_whose_frames_were_cut_is_run_again(nominal: Document, tmp_path: Path) -> None:
-    scenario = nominal.with_values({"time.end": 0.01}).build()
-    row = run_case(scenario, tmp_path)
-    frames = (tmp_path / files.FRAMES).read_bytes()
-    os.truncate(tmp_path / files.FRAMES, len(frames) // 2)
-    assert run_case(scenario, tmp_path) == row
-    assert (tmp_path / files.FRAMES).read_bytes() == frames
