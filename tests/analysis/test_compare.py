@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, strategies as st
 from scipy import stats
 
-from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict, compare_final, interval, lower_bound, quantile
+from blocksim.analysis.compare import Comparison, ComparisonRow, compare_final, interval, lower_bound, quantile
 from blocksim.analysis.experiment import ExperimentTable, Measurement, load_table
 from blocksim.errors import InvalidInputError
 from tests.golden import Golden
@@ -89,17 +88,6 @@ def test_final_tables_that_cannot_be_compared_are_refused(golden: Golden, tmp_pa
         with pytest.raises(InvalidInputError) as caught:
             compare_final(final, table)
         golden(str(caught.value), name)
-
-
-finite = st.floats(-1e4, 1e4)
-
-
-@given(repeats=st.lists(finite, min_size=2, max_size=6, unique=True), value=finite)
-def test_distance_is_what_it_takes_to_come_inside(repeats: list[float], value: float) -> None:
-    judged = compare_final(final_table(x=(value,), rotation=(0.0,)), table_of(*repeats)).rows[0]
-    nearest = min(max(value, min(repeats)), max(repeats))
-    assert judged.distance == pytest.approx(abs(value - nearest), abs=1e-9)
-    assert (judged.verdict is Verdict.INSIDE) == (min(repeats) <= value <= max(repeats))
 
 
 @pytest.mark.parametrize(("count", "total"), [(0, 1), (1, 1), (0, 6), (3, 6), (6, 6), (17, 40), (9_700, 10_000)])

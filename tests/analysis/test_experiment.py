@@ -6,17 +6,12 @@ import numpy as np
 import pytest
 
 from blocksim.analysis.curves import load_curves
-from blocksim.analysis.experiment import ExperimentTable, load_properties, load_table
+from blocksim.analysis.experiment import load_properties, load_table
 from blocksim.errors import InvalidInputError
 from tests.golden import Golden, read
 
 EXPERIMENTS = Path(__file__).parents[2] / "scenarios" / "experiments"
 HEADER = "block,quantity,unit,replicate,value\n"
-
-
-@pytest.fixture(name="centres", scope="module")
-def fixture_centres() -> ExperimentTable:
-    return load_table(EXPERIMENTS / "three_blocks.csv")
 
 
 def written(folder: Path, text: str) -> Path:
@@ -25,7 +20,8 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-def test_statistics_of_the_paper_match_numpy_and_the_design(centres: ExperimentTable) -> None:
+def test_statistics_of_the_paper_match_numpy_and_the_design() -> None:
+    centres = load_table(EXPERIMENTS / "three_blocks.csv")
     statistics = centres.statistics().set_index(["block", "quantity"]).to_dict(orient="index")
     second, third = statistics["2", "x"], statistics["3", "x"]
     assert (second["n"], second["minimum"], second["maximum"]) == (6, 71.69, 78.53)

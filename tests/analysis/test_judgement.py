@@ -60,12 +60,6 @@ def test_settings_that_mean_nothing_are_refused(wrong: dict[str, float]) -> None
         Settings(**wrong)
 
 
-def test_one_member_and_one_repeat_are_enough_for_an_answer() -> None:
-    found = judge(members_of({("1", "x"): [1.0], ("1", "rotation"): [0.0]}), table_of({("1", "x"): [1.2]}))
-    assert found.inside
-    assert found.findings["joint"].rows == ()
-
-
 def swept() -> pd.DataFrame:
     return pd.DataFrame(
         {

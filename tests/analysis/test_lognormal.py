@@ -58,14 +58,6 @@ def test_counts_without_a_finite_dispersion_have_no_curve(failed: list[int], low
     assert (none.low, none.high) == (low, high)
 
 
-def test_few_members_do_not_bound_the_median() -> None:
-    assert found([0] * 8, members=4) == NoCurve("no sample fails at any intensity", 0.0, math.inf)
-    flat = found([6, 5, 4, 5, 6, 4, 6, 7], members=16)
-    assert isinstance(flat, Curve)
-    assert flat.median_interval[1] == flat.dispersion_interval[1] == math.inf
-    assert 0.0 < flat.median_interval[0] < flat.median
-
-
 def test_counts_that_jump_up_and_down_do_not_pass_for_a_curve() -> None:
     curve, jumps = found(DRAWN), found([0, 32, 0, 32, 9, 28, 15, 32])
     assert isinstance(curve, Curve)

@@ -12,27 +12,7 @@ from tests.golden import Golden
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
-VALID = """\
-schema = 1
-name = "case"
-
-[materials.steel]
-density = 7850
-young_modulus = "210 GPa"
-poisson_ratio = 0.3
-
-[blocks.brick]
-width = "40 mm"
-height = "20 mm"
-length = "60 mm"
-material = "steel"
-
-[[structures]]
-kind = "stack"
-block = "brick"
-count = 3
-"""
-
+VALID = (Path(__file__).parent / "valid" / "scenario.toml").read_text()
 MATERIAL = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
 BRICK: dict[str, Any] = {"width": 0.2, "height": 0.1, "length": 0.1, "material": "oak"}
 

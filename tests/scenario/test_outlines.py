@@ -48,15 +48,6 @@ def test_moments_are_those_of_the_triangles_from_the_first_corner(
     assert section_of(centre_outline(points.tolist())) == pytest.approx((areas.sum(), polar), rel=1e-8)
 
 
-@given(ANGLES, st.floats(0.1, 10.0))
-def test_the_sense_of_the_corners_does_not_matter(angles: list[int], wide: float) -> None:
-    points = on_ellipse(angles, wide)
-    one, other = centre_outline(points), centre_outline([points[0], *points[:0:-1]])
-    assert one[0] == pytest.approx(other[0], abs=1e-12)
-    assert np.ravel(one) == pytest.approx(np.ravel(other), abs=1e-12)
-    assert centroid(one) == pytest.approx((0.0, 0.0), abs=1e-14)
-
-
 def test_an_outline_far_from_its_origin_keeps_its_digits() -> None:
     near = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.25), (0.0, 0.25)]
     far = [(x + 500_000.0, y + 5_500_000.0) for x, y in near]
@@ -136,11 +127,3 @@ def test_a_lattice_fills_a_square_and_keeps_its_discs_inside_a_slope() -> None:
 def test_the_weight_above_counts_what_is_there_only() -> None:
     points = np.array([[0.5, 0.5], [1.5, 0.25], [0.5, 2.5]])
     assert geometry.height_above(ELL, points) == pytest.approx([1.5, 0.75, 0.0])
-
-
-def test_corners_run_counter_clockwise_and_edges_that_cross_are_found() -> None:
-    assert geometry.area_of(geometry.corners_of([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])) == 1.0
-    assert geometry.area_of(ELL) == 3.0
-    bow = np.array([[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]])
-    assert list(geometry.self_crossings(bow)) == [(0, 2)]
-    assert list(geometry.self_crossings(ELL)) == []

@@ -74,18 +74,18 @@ def test_floats_come_back_bit_equal_and_millimetres_are_divided_by_no_rounded_fa
     assert parse_quantity(f"{number} mm", LENGTH)[0] == number / 1000
 
 
-KINDS = """Angle 90 deg|Angle 1|Angle true|Angle nan|Angle inf|Angle 3 m|Angle 1 /s|Speed 5 mm/s|Spin 180 deg/s
-Spin 60 rpm|Pressure 69 GPa|Density 2.7 g/cm^3|UnitWeight 26.7 kN/m^3|Time 1 ms|Stiffness 1 N/mm
-NonNegativeAcceleration 9.81 m/s²|Friction 45 deg|Friction 89 deg|Friction -1 deg|PositiveLength 1 nm
-PositiveLength 0|NonNegativeTime 0|NonNegativeTime -1 ns|Share 1|Share 1.0000001|Safety 0.1|Safety 0.2
-PoissonRatio -0.999|PoissonRatio -1|TiltAngle 89.9 deg|TiltAngle -90 deg"""
+KINDS = """Angle 90 deg|Angle 1|Angle -0.5|Angle "1"|Angle true|Angle nan|Angle inf|Angle 3 m|Angle 1 /s|Speed 5 mm/s
+Spin 180 deg/s|Spin 60 rpm|Pressure 69 GPa|Density 2.7 g/cm^3|UnitWeight 26.7 kN/m^3|Time 1 ms
+Stiffness 1 N/mm|NonNegativeAcceleration 9.81 m/s²|Friction 45 deg|Friction 89 deg|Friction -1 deg
+PositiveLength 1 nm|PositiveLength 0|NonNegativeTime 0|NonNegativeTime -1 ns|Share 1|Share 1.0000001
+Safety 0.1|Safety 0.2|PoissonRatio -0.999|PoissonRatio -1|TiltAngle 89.9 deg|TiltAngle -90 deg"""
 
 
 def test_every_kind_reads_its_unit_and_has_its_bounds(golden: Golden) -> None:
     """What is no number, and true, is a text or a value as in TOML."""
 
     def told(kind: str, text: str) -> str:
-        value = tomllib.loads(f"v = {text}")["v"] if re.fullmatch(r"true|nan|inf|[-.\d]+", text) else text
+        value = tomllib.loads(f"v = {text}")["v"] if re.fullmatch(r'true|nan|inf|[-.\d]+|".*"', text) else text
         try:
             return repr(TypeAdapter(getattr(q, kind)).validate_python(value))
         except ValidationError as error:
@@ -93,15 +93,6 @@ def test_every_kind_reads_its_unit_and_has_its_bounds(golden: Golden) -> None:
 
     kinds = [line.split(" ", 1) for line in re.split(r"[|\n]", KINDS)]
     golden("\n".join(f"{kind} {text}: {told(kind, text)}" for kind, text in kinds), rules=["digits"])
-
-
-NO_ANGLES = (-0.5, "1", None, 10**400)
-
-
-def test_what_is_no_angle() -> None:
-    for value in NO_ANGLES:
-        with pytest.raises(ValidationError):
-            TypeAdapter(q.Angle).validate_python(value)
 
 
 def test_values_are_shown_as_in_toml_and_short(golden: Golden) -> None:

@@ -44,24 +44,7 @@ OF_SOILS = ("friction_angle", "cohesion", "dilation", "yield_surface")
 
 @pytest.fixture
 def data() -> dict[str, Any]:
-    material = {"density": 1, "young_modulus": 1, "poisson_ratio": 0}
-    block = {"width": 1, "height": 1, "length": 1, "material": "m"}
-    return {
-        "schema": 1,
-        "name": "a",
-        "materials": {"m": material, "n": material},
-        "blocks": {"b": block, "c": block},
-        "structures": [{"kind": "stack", "block": "b", "count": 1}],
-        "bodies": [{"block": "b", "x": 10, "y": 10}],
-        "walls": [{"from": [-10, 0], "to": [-10, 1]}],
-        "pairs": {"m": {"n": {"friction": 0.3}}},
-        "motion": {"kind": "harmonic", "amplitude": 1, "frequency": 1},
-        "probes": [{"kind": "point", "body": "1"}],
-        "loads": [{"kind": "force", "body": "1", "magnitude": 1}],
-        "actuators": [{"body": "1", "displacement": {"kind": "ramp", "to": 0.1, "rate": 0.1}}],
-        "start": {"settle": True},
-        "time": {"end": 2},
-    }
+    return tomllib.loads(Path(__file__).with_name("all_tables.toml").read_text())
 
 
 def leaves(table: BaseModel, path: str = "") -> Iterator[str]:

@@ -164,8 +164,9 @@ def test_scenario_that_fails_as_it_is_and_one_cut_by_the_end_of_time_say_so(slid
     failing = converge(with_setting(slide, "contact.max_overlap", 1e-9), studies=["step"], out=tmp_path / "failing")
     assert failing.failed
     assert (failing.recommended, failing.studies[0].verdict) == (None, ConvergenceVerdict.FAILED)
-    short = converge(with_setting(slide, "time.end", 0.01), studies=["step"], out=tmp_path / "short")
+    short = converge(rigid("slide", time__end=0.01), out=tmp_path / "short")
     assert any("depend on time.end" in text for text in short.notes)
+    assert any("contacts are rigid" in text for text in short.notes)
 
 
 def rigid(name: str, **values: object) -> Scenario:
@@ -185,11 +186,3 @@ def test_step_and_tolerance_of_rigid_contacts_are_refined_from_what_the_run_take
     step, tolerance = refinements_of(rigid("wall", time__step=5e-4))  # a crowd has a tolerance of its own
     assert (step.own, tolerance.own) == (5e-4, 0.1)
     assert refinements_of(rigid("three_blocks_nominal", time__step=6e-3))[0].coarser == 0  # 12 ms would be refused
-
-
-def test_slide_converges_in_the_square_of_the_step(tmp_path: Path) -> None:
-    found = converge(rigid("slide", contact__restitution=0.0), tolerance_mm=0.01, out=tmp_path)
-    step, tolerance = found.studies
-    assert (step.verdict, tolerance.verdict) == (ConvergenceVerdict.CONVERGED, ConvergenceVerdict.CONVERGED)
-    assert max(level.change_mm for level in tolerance.levels[-2:]) < 1e-3
-    assert "contacts are rigid" in found.notes[0]

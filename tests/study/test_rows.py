@@ -1,6 +1,7 @@
 """Rows of sweep.csv: columns with units, which are inside the measured ranges, and that a kill loses none of them."""
 
 import math
+import tomllib
 import zlib
 from pathlib import Path
 
@@ -10,33 +11,19 @@ from blocksim.scenario import Document
 from blocksim.study.manifest import CaseIndex, Entry, Manifest, read_entries, short_hash
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.rows import Head, Range, Ranges, as_cell, heads_of
-from tests.study.plans import OVERLAP, TILT, cases, plan_of
+from tests.golden import Golden
+from tests.study.plans import TILT, cases, plan_of
 
-FRICTION = "friction.block_block"
+VARIED: list[dict[str, Values]] = tomllib.loads(Path(__file__).with_name("heads.toml").read_text())["vary"]
 
 
-@pytest.mark.parametrize(
-    ("key", "values", "head", "cells"),
-    [
-        (TILT, {"from": "0 deg", "to": "10 deg", "count": 3}, "ground.tilt [deg]", [0.0, 5.0, 10.0]),
-        (TILT, ["1 deg", "0.1 rad"], "ground.tilt [deg]", [1.0, pytest.approx(5.729577951)]),
-        (TILT, [0, "10 deg"], "ground.tilt [deg]", [0.0, 10.0]),
-        (OVERLAP, ["11 mm", 0.01, "0.9 cm"], "structures.0.overlap [mm]", [11.0, 10.0, 9.0]),
-        (OVERLAP, [0.01, 0.011], OVERLAP, [0.01, 0.011]),
-        (FRICTION, ["20 deg", "30 deg"], "friction.block_block [deg]", [20.0, 30.0]),
-        (FRICTION, ["20 deg", 0.4], FRICTION, ["20 deg", 0.4]),  # 0.4 is no angle of 0.4 rad
-        ("gravity", [9.81, 1.62], "gravity", [9.81, 1.62]),
-        ("contact.model", ["surface", "kernel"], "contact.model", ["surface", "kernel"]),
-        ("time.step", ["auto", "1e-7 s"], "time.step", ["auto", "1e-7 s"]),
-    ],
-)
-def test_numbers_have_the_unit_that_was_typed(
-    nominal: Document, key: str, values: Values, head: str, cells: list[object]
-) -> None:
-    document = with_sweep(nominal, {key: values})
-    (column,) = heads_of(plan_of(document))
-    assert str(column) == head
-    assert [column.cell(row[key]) for row in cases(document).design] == cells
+def test_numbers_have_the_unit_that_was_typed(nominal: Document, golden: Golden) -> None:
+    told = []
+    for vary in VARIED:
+        document = with_sweep(nominal, vary)
+        (column,) = heads_of(plan_of(document))
+        told.append(f"{column}: {', '.join(repr(column.cell(*row.values())) for row in cases(document).design)}")
+    golden("\n".join(told), rules=["digits"])
 
 
 def test_drawn_angles_are_numbers_in_the_unit_of_their_range(nominal: Document) -> None:

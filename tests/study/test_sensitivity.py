@@ -107,13 +107,6 @@ def test_morris_effects_of_a_plane_are_its_slopes_over_the_ranges() -> None:
     assert found.numbers["sigma"] == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
 
-def test_morris_tells_interaction_from_a_plain_effect() -> None:
-    found = indices("morris", lambda x, y, z: x * y + z, dict.fromkeys("xyz", Uniform(-1.0, 1.0)), 32)
-    x, y, z = found.numbers["sigma"]
-    assert min(x, y) > 1.0
-    assert z == pytest.approx(0.0, abs=1e-9)
-
-
 def test_morris_stays_off_the_infinite_ends_of_a_normal_distribution() -> None:
     points = METHODS["morris"].points(1, 8, 0)
     values = [float(str(row["x"])) for row in settings_at(points, {"x": Normal(0.0, 1.0)})]

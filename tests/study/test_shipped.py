@@ -92,15 +92,6 @@ def test_water_moves_a_wall_that_soil_does_not(friction: float, slides: list[str
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("tilt", "flows"), [("26.2 deg", False), ("27 deg", True)])
-def test_sand_in_a_box_flows_once_the_tangent_of_its_tilt_is_the_sine_of_its_friction_angle(
-    tilt: str, flows: bool
-) -> None:
-    """26.6 degrees for 30; it would be 30 with normal stresses along the layer that stay what they are."""
-    assert (moved(run_soil("tilting_box", {"ground.tilt": tilt}), "1") > 10.0) == flows
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(("cohesion", "falls"), [("480 Pa", True), ("580 Pa", False)])
 def test_a_vertical_cut_needs_the_cohesion_of_limit_analysis(cohesion: str, falls: bool) -> None:
     """Within a tenth of 530 Pa."""

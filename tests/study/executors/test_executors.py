@@ -17,7 +17,7 @@ from blocksim.simulation import files, simulate
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.results import read_summary
 from blocksim.study import executors as batches
-from blocksim.study.executors import GROWTH, MOST, BatchSize, Execution, RunSetting, Task, load_executor, take
+from blocksim.study.executors import GROWTH, MOST, BatchSize, Execution, RunSetting, Task, load_executor
 from blocksim.study.executors.ensemble import rows_of, run_case, run_members
 from blocksim.study.manifest import Shard
 from blocksim.study.plan import Values
@@ -157,13 +157,6 @@ def test_batch_grows_with_the_speed_and_never_without_bounds() -> None:
     assert size.count == MOST
     size.adapt(MOST, 1e9)
     assert size.count == 2
-
-
-def test_tasks_are_taken_as_they_are_needed() -> None:
-    tasks = iter([Task(number, "", {}, None) for number in range(5)])  # type: ignore[arg-type]
-    assert [task.number for task in take(tasks, 2, lambda: False)] == [0, 1]
-    assert take(tasks, 2, lambda: True) == ()
-    assert [task.number for task in take(tasks, 9, lambda: False)] == [2, 3, 4]
 
 
 def test_a_script_without_a_main_guard_is_told_so_whatever_study_it_begins(monkeypatch: pytest.MonkeyPatch) -> None:
