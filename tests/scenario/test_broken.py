@@ -39,6 +39,7 @@ def edits() -> dict[str, tuple[Edit, str]]:
 
 EDITS = edits() | {
     "overlong text": ((WIDTH, f'width = "{"4" * 200} mm"'), VALID),
+    "whole number beyond any float": ((WIDTH, f"width = {'9' * 400}"), VALID),
     "line with a tab and a bell": ((WIDTH, '\twidth = "\x07"'), VALID),
     "very long line": ((WIDTH, "width = { " + ", ".join(f"k{i} = {i}" for i in range(60)) + " }"), VALID),
 }
