@@ -80,11 +80,8 @@ def test_members_that_did_not_finish_are_named_and_have_no_values() -> None:
     assert members.failures == (Failure(2, "b", "failed", "too deep"), Failure(3, "", "invalid", ""))
     assert Members(swept().drop(columns="reason"), "sweep.csv").failures[0].reason == ""
     assert np.array_equal(members.values("left.wing", "x"), [1.0, np.nan, np.nan], equal_nan=True)
-
-
-def test_values_that_are_not_finite_are_no_values() -> None:
-    changed = swept().assign(**{"2.rotation_deg": [np.inf, 1.0, 1.0]})
-    assert np.isnan(Members(changed, "sweep.csv").values("2", "rotation")).all()
+    endless = Members(swept().assign(**{"2.rotation_deg": [np.inf, 1.0, 1.0]}), "sweep.csv")
+    assert np.isnan(endless.values("2", "rotation")).all()
 
 
 def test_tables_of_sweeps_that_are_of_no_use_are_refused(golden: Golden) -> None:

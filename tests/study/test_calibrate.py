@@ -140,6 +140,8 @@ def test_failed_members_count_as_outside_and_each_quantity_is_reported_by_itself
     score = score_of([member(12.0), FAILED, member(math.nan)], RANGES)
     assert (score.members, score.inside, score.failed) == (3, 1, 2)
     assert score.share_inside == pytest.approx(1 / 3)
+    near, far = (score_of([member(x), member(x + 1.0)], RANGES).value for x in (15.0, 25.0))
+    assert 0.0 > near > far >= -0.25  # of two, never as much as one of them
     x, rotation = hits_of([member(12.0, 0.0), member(20.0), member(22.0), FAILED], RANGES)
     assert (x.median, x.share_inside, rotation.median, rotation.share_inside) == (20.0, 0.25, -90.0, 0.5)
     (nothing, _) = hits_of([FAILED], RANGES)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,8 +20,8 @@ from blocksim.study.sensitivity import (
     sensitivity,
     settings_at,
 )
+from tests.study.conftest import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SOFT = {"contact.stiffness_scale": 0.001}
 
 
