@@ -90,6 +90,15 @@ def sort(positions: Floats, radius: float) -> tuple[CellGrid, list[list[int]]]:
     return grid, [order[starts[c] : starts[c + 1]].tolist() for c in range(count)]
 
 
+def test_a_few_that_have_flown_off_do_not_make_cells_larger() -> None:
+    positions = np.random.default_rng(3).uniform(0.0, 1.0, (1000, 2))
+    positions[::100] = np.random.default_rng(4).uniform(-1e300, 1e300, (10, 2))
+    positions[7] = np.nan
+    grid, cells = sort(positions, 0.1)
+    assert grid.size < 0.2
+    assert max(map(len, cells)) < 60
+
+
 def by_cells(positions: Floats, points: Floats, radius: float) -> list[list[int]]:
     offsets, indices = find_neighbours(positions, points, radius)
     return [sorted(indices[offsets[i] : offsets[i + 1]].tolist()) for i in range(len(points))]

@@ -158,6 +158,9 @@ def test_the_largest_rotation_is_followed_to_the_end_and_the_first_frame_of_a_mo
     periods, places = np.array([0.0, 3.0]), np.zeros((2, 3, 2))
     reaches, steps, bodies = np.full((2, 2), 0.03), np.zeros(2, dtype=np.int64), zeros(3, BODY)
     seen = Watched(periods, periods, steps, places, places.copy(), reaches, thresholds, np.zeros(2))
+    bodies.x[:2], bodies.y[:2], bodies.angle[:2] = 0.6e-3, -0.79e-3, -0.99e-3 / 0.03
+    watch(bodies, seen, 1, 3)
+    assert seen.steps.tolist() == [0, 0]
     assert [frame_to_watch(seen, m, 4) for m in (0, 1)] == [0, 6]
     for step, angle in ((6, -0.2), (9, 0.1)):
         bodies.angle[:2] = angle

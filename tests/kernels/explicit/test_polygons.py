@@ -164,8 +164,7 @@ STEEP = 2e-3  # of the force: changes from one place to the next that may hide a
 
 ROUGH = [[-0.02, -0.004], [-0.006, -0.012], [0.012, -0.01], [0.018, 0.003], [0.004, 0.014], [-0.014, 0.01]]
 SHAPES = {"triangle": regular(3), "square": regular(4), "hexagon": regular(6), "16-gon": regular(16), "rough": ROUGH}
-MEETINGS = [("triangle", "square"), ("square", "square"), ("hexagon", "hexagon"), ("hexagon", "16-gon")]
-MEETINGS += [("16-gon", "16-gon"), ("rough", "16-gon"), ("rough", "rough"), ("triangle", "16-gon")]
+MEETINGS = [("triangle", "square"), ("hexagon", "16-gon"), ("16-gon", "16-gon"), ("rough", "rough")]
 QUICKEST = ("triangle", "square", "linear")
 
 

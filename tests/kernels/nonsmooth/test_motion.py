@@ -11,7 +11,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from blocksim.kernels.common.arrays import NOT_FINITE
+from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT
 from blocksim.kernels.nonsmooth.arrays import FAR, Nonsmooth
 from blocksim.kernels.nonsmooth.cuts import set_length
 from blocksim.kernels.nonsmooth.impact_rounds import find_contact_groups
@@ -58,6 +58,11 @@ def test_edges_of_pieces_of_ground() -> None:
     # as the explicit scheme has it: turned about the edge of a step
     assert run.bodies.x[0] == pytest.approx(12.285e-3, abs=1e-4)
     assert math.degrees(run.bodies.angle[0]) == pytest.approx(-47.69, abs=0.3)
+
+
+@pytest.mark.parametrize(("most", "status"), [(1e-6, OVERLAP_LIMIT), (2e-6, 0)])
+def test_overlap_beyond_the_limit_stops_the_run(most: float, status: int) -> None:
+    assert single([{"y": ON_GROUND}], restitution=0.0, contact={"max_overlap": most}).to_time(0.05).status == status
 
 
 def test_state_that_is_not_finite_stops_the_run() -> None:
