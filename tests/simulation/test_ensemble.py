@@ -96,15 +96,6 @@ def test_a_batch_of_everything_has_the_bits_of_runs_of_their_own() -> None:
         assert_same(end, scenario)
 
 
-@pytest.mark.long  # a minute of compiling
-def test_models_with_particles_go_together_too() -> None:
-    change = {"contact.model": "kernel", "contact.particle_spacing": 0.004, "time.end": 0.002}
-    others = [{**change, **more} for more in ({"contact.model": "particles"}, {"contact.particle_spacing": 0.003}, {})]
-    scenarios = collapses(change, {**change, "friction.block_block": 0.1}, *others)
-    for end, scenario in zip(run_ensemble(scenarios, threads=2), scenarios, strict=True):
-        assert_same(end, scenario)
-
-
 @pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
 def test_a_pair_list_that_fills_up_on_the_way_changes_no_bit(scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scenarios = [pushed_wall(4, 5, contact=WALL, time={"scheme": scheme, "end": end}) for end in (0.05, 0.06)]

@@ -17,9 +17,9 @@ from blocksim.bench.harness import pushed_wall
 from blocksim.errors import ExitCode, InvalidInputError, OutputError
 from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
+from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation import loop, run_ensemble, schemes, simulate, simulate_into
-from blocksim.simulation.balance import BODY_STEPS, FIRST_CHECK, EnergyLedger, next_energy_check
+from blocksim.simulation.balance import FIRST_CHECK, EnergyLedger
 from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
 from blocksim.simulation.instruments import Recorder
 from blocksim.simulation.interruption import interruptible, stop_requests
@@ -28,15 +28,12 @@ from blocksim.simulation.provenance import state_hash
 from blocksim.simulation.schemes import (
     ALONE,
     BODIES_A_THREAD,
-    SCHEMES,
     Team,
     build_scene,
     measure_row,
     team_for,
     useful_threads,
 )
-from blocksim.simulation.schemes.explicit import SURFACE_OF_OUTLINES
-from blocksim.simulation.schemes.nonsmooth import IN_ROUNDS, OF_OUTLINES
 from blocksim.world import build as world_build
 from blocksim.world.build import arrays_of, build_world
 from tests.simulation.sliding import sliding
@@ -101,15 +98,6 @@ ENTRIES = dict.fromkeys(sorted(set(EnergyLedger.model_fields) - {"start", "in_pl
 def test_every_entry_is_in_the_residual(name: str) -> None:
     some = EnergyLedger(**{**ENTRIES, name: 4.0}, start=7.0, in_play=2.0)
     assert (some.residual, some.relative_residual) == (-3.0, 1.5)
-
-
-@pytest.mark.parametrize("bodies", [3, 10_000])
-def test_looks_are_rarer_where_steps_are_cheap_whenever_a_run_was_interrupted(bodies: int) -> None:
-    looks = [0]
-    while looks[-1] < 10 * BODY_STEPS:
-        looks.append(next_energy_check(looks[-1], bodies))
-        assert next_energy_check(looks[-1] - 1, bodies) == looks[-1]
-    assert BODY_STEPS // bodies <= looks[-1] - looks[-2] <= max(FIRST_CHECK, 4 * BODY_STEPS // bodies)
 
 
 def test_where_a_run_fails_depends_on_nothing_that_watches_it(soft: Shipped, tmp_path: Path) -> None:
@@ -230,30 +218,20 @@ def alone() -> dict[str, dict[str, bytes]]:
 
 
 @both
-def test_threads_do_not_change_a_bit_of_a_collapse_nor_of_its_ledger(
-    alone: dict[str, dict[str, bytes]], scheme: str
+def test_threads_and_more_room_for_pairs_change_no_bit_of_a_collapse_nor_of_its_ledger(
+    alone: dict[str, dict[str, bytes]], monkeypatch: pytest.MonkeyPatch, scheme: str
 ) -> None:
     """A team continues where it, one thread or another team has stopped."""
+    monkeypatch.setattr(world_build, "PAIRS_PER_BODY", 1)
+    monkeypatch.setattr(world_build, "GROWTH", 1.05)
     scene, last = build_scene(wall(scheme)), STEPS[scheme]
+    capacity = sum(array.size for array in arrays_of(scene))
     with Team(3) as together, Team(2) as couple:
         for team, step in ((together, 0), (together, 7), (couple, last // 3), (ALONE, last // 2), (together, last)):
             scene, status = team.advance(scene, step)
             assert status == 0
-    assert scene.world.clock[0].rebuilds > 5
-    assert bits(scene) == alone[scheme]
-
-
-@pytest.mark.parametrize(("scheme", "threads"), [("explicit", 2), ("nonsmooth", 1)])
-def test_more_room_for_pairs_keeps_impulses_and_tallies(
-    alone: dict[str, dict[str, bytes]], monkeypatch: pytest.MonkeyPatch, scheme: str, threads: int
-) -> None:
-    monkeypatch.setattr(world_build, "PAIRS_PER_BODY", 1)
-    monkeypatch.setattr(world_build, "GROWTH", 1.05)
-    scene = build_scene(wall(scheme))
-    capacity = sum(array.size for array in arrays_of(scene))
-    with Team(threads) as together:
-        scene, _ = together.advance(scene, STEPS[scheme])
     assert sum(array.size for array in arrays_of(scene)) > capacity
+    assert scene.world.clock[0].rebuilds > 5
     assert bits(scene) == alone[scheme]
 
 
@@ -285,28 +263,6 @@ def test_threads_that_there_are_not_are_refused_and_nothing_hangs(monkeypatch: p
     monkeypatch.setattr(ThreadPoolExecutor, "submit", refuse)
     with pytest.raises(InvalidInputError, match="2 threads cannot be started here: can't start new thread"):
         Team(2).__enter__()
-
-
-SETS = {name: changes for scheme in SCHEMES.values() for name, changes in scheme.kernel_sets.items()}
-REBOUND: dict[str, Any] = {"time": {"scheme": "nonsmooth"}, "pairs": {"any": {"ground": {"restitution": 0.9}}}}
-
-
-@pytest.mark.parametrize("name", [*SETS, "rebound of a pair"])
-def test_only_scenes_with_outlines_or_impacts_in_rounds_have_the_kernels_for_them(name: str) -> None:
-    changes = SETS.get(name, REBOUND)
-    scenario = scenario_from_mapping({**schemes.SMALLEST_SCENE, **changes})
-    found, scene = schemes.kernels_of(scenario), build_scene(scenario)
-    assert found == (name if name in SETS else IN_ROUNDS["nonsmooth"])
-    in_rounds = isinstance(scene, Nonsmooth) and scene.contacts.impact_lanes is not None
-    assert in_rounds == (found in IN_ROUNDS.values())
-    rectangles = {key: value for key, value in changes.items() if key != "blocks"}
-    of_outlines = {
-        OF_OUTLINES: "nonsmooth",
-        SURFACE_OF_OUTLINES: "surface",
-        IN_ROUNDS[OF_OUTLINES]: IN_ROUNDS["nonsmooth"],
-    }
-    plain = scenario_from_mapping({**schemes.SMALLEST_SCENE, **rectangles})
-    assert schemes.kernels_of(plain) == of_outlines.get(name, found)
 
 
 def test_full_disk_of_the_kernel_cache_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -253,25 +253,6 @@ def test_contacts_and_weight_are_all_that_accelerates_blocks(soft: Shipped, mode
     assert off[..., 2].max() <= 1e-2 * size[2]
 
 
-def test_impulses_and_weight_are_all_that_accelerates_blocks_without_springs(
-    soft: Shipped, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Also of impacts that follow one another within a substep."""
-    monkeypatch.setattr(
-        "blocksim.world.nonsmooth.is_cut_at_impacts", lambda *_: False
-    )  # no step is cut: a frame has the impulses of the last part
-    values = {"time__end": 0.3, "time__substeps": 1, "output__contacts": True, "output__every": EVERY_STEP}
-    result = simulate(soft("three_blocks_nonsmooth", contact__restitution=1.0, **values))
-    found, expected = changes(result), accelerations(result)[1:]
-    # velocities live half a step before positions; blocks in flight are shown half a kick later
-    half_kick = 0.5 * result.scenario.gravity
-    off = np.abs(found - expected)
-    assert off[..., 1].max() <= half_kick * (1.0 + 1e-6)
-    assert off[..., 0].max() <= 1e-9 * np.abs(found[..., 0]).max()
-    assert off[..., 2].max() <= 1e-3 * np.abs(found[..., 2]).max()  # arms are those of the middle of the step
-    assert (off[..., 1] > 1e-6).any(axis=1).mean() < 0.1
-
-
 @pytest.mark.parametrize(("name", "scheme"), [("three_blocks_nominal", "explicit"), ("slope", "nonsmooth")])
 def test_contacts_of_blocks_at_rest_hold_their_weight_and_are_counted(soft: Shipped, name: str, scheme: str) -> None:
     result = simulate(soft(name, time__scheme=scheme, output__contacts=True))

@@ -15,12 +15,11 @@ from typing import TYPE_CHECKING, Any
 import llvmlite.binding
 import numba
 import numpy as np
-import pandas as pd
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, placement
-from blocksim.simulation import Progress, Result, provenance, read_result, simulate_into
+from blocksim.simulation import Progress, Result, provenance, simulate_into
 from blocksim.simulation.balance import RESIDUAL_PROMISE
 from blocksim.simulation.results import read_summary
 from blocksim.simulation.run import RunCallbacks, bytes_needed
@@ -86,37 +85,6 @@ def test_resolved_scenario_runs_to_the_same_bits_from_its_own_folder_too(
         assert {path.name for path in place.iterdir()} == FILES
         for name in ("scenario.toml", "experiment.csv", "final.csv"):
             assert (place / name).read_bytes() == (folder / name).read_bytes()
-
-
-def test_result_comes_back_from_its_folder_with_frames_from_start_to_end(kept: Result, folder: Path) -> None:
-    back = read_result(folder)
-    pd.testing.assert_frame_equal(back.final, kept.final, check_exact=True)
-    assert back.summary == kept.summary
-    np.testing.assert_array_equal(back.frames.x, kept.frames.x)
-    np.testing.assert_array_equal(back.frames.energy["friction"], kept.frames.energy["friction"])
-    assert back.frames.names == ("1", "2", "3")
-    frames = kept.frames
-    assert (frames.time[0], frames.time[-1]) == (0.0, kept.summary.simulated_time_s)
-    assert np.all(np.diff(frames.step) > 0)
-    np.testing.assert_allclose(np.diff(frames.time[:-1]), 1e-3, atol=kept.summary.time_step_s)
-
-
-def test_failed_run_is_kept_in_valid_json_without_the_mark_of_a_finished_one(soft: Shipped, tmp_path: Path) -> None:
-    """Also with numbers that JSON does not know."""
-    result = simulate_into(soft(time__force_step=True, time__step=1e-3, contact__max_overlap=1.0), tmp_path / "run")
-    assert (result.status, result.summary.exit_code) == ("failed", 76)
-    assert {path.name for path in (tmp_path / "run").iterdir()} == FILES - {"done.json"}
-    json.loads((tmp_path / "run" / "run.json").read_text(), parse_constant=pytest.fail)
-    assert read_result(tmp_path / "run").status == "failed"
-
-
-def test_vanished_experiment_leaves_no_folder(soft: Shipped, tmp_path: Path) -> None:
-    scenario = soft()
-    assert scenario.experiment is not None
-    gone = scenario.experiment.model_copy(update={"table": tmp_path / "gone.csv"})
-    with pytest.raises(InputMissingError, match=r"gone\.csv"):
-        simulate_into(scenario.model_copy(update={"experiment": gone}), tmp_path / "run")
-    assert not (tmp_path / "run").exists()
 
 
 def test_estimate_is_no_less_than_what_a_run_leaves(tmp_path: Path) -> None:

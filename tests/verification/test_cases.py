@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from math import cos, isnan, radians, sin, sqrt
+from math import isnan, sqrt
 from pathlib import Path
 
-import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
-from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Case, CaseOutcome, Row, Setting, at_least, run_case
 from blocksim.verification.cases import CASES, SettingError, choose_cases, exclusions
 from blocksim.verification.reference import (
@@ -85,19 +82,10 @@ def test_case_in_full_is_inside_its_tolerances(case: Case, head: str) -> None:
     assert missed(run_case(case, SETTINGS[head])) == []
 
 
-@pytest.mark.parametrize(
-    ("name", "outside"),
-    [
-        pytest.param("S2", ["corrected: K, 5 mm"], marks=LONG),  # tests/simulation has one on a rough base
-        pytest.param("S4", [], marks=LONG),
-        pytest.param("S6", [], marks=LONG),
-        ("S8", []),
-        pytest.param("S12", [], marks=LONG),
-    ],
-)
-def test_quick_case_of_soil_is_inside_its_tolerances(name: str, outside: list[str]) -> None:
-    (case,) = choose_cases([name], Setting(), soil=True)
-    assert missed(run_case(case, Setting(quick=True))) == outside
+def test_path_of_one_particle_of_soil_is_inside_its_tolerances() -> None:
+    """The other cases of soil are long; tests/simulation has a wall that yields on a rough base."""
+    (case,) = choose_cases(["S8"], Setting(), soil=True)
+    assert missed(run_case(case, Setting(quick=True))) == []
 
 
 @LONG
@@ -185,7 +173,6 @@ def test_cases_that_are_not_there_are_told_and_those_about_springs_say_why() -> 
         choose_cases(["V1", "v20"], SETTINGS[RIGID])
 
 
-G = 9.81
 ROW = DominoModel(thickness=7.5 / 48.0, gap=0.3)
 UNIT = sqrt(9.81 * 0.048)  # m/s
 
@@ -194,56 +181,6 @@ def test_limit_is_found_to_half_of_the_last_interval_where_the_outcome_changes()
     assert limit(lambda value: value > 0.3, 0.0, 1.0, 10) == pytest.approx(0.3, abs=2.0**-11)
     assert math.isnan(limit(lambda value: value > -1.0, 0.0, 1.0, 10))
     assert math.isnan(limit(lambda value: value > 2.0, 0.0, 1.0, 10))
-
-
-@pytest.mark.parametrize(("width", "height", "slope"), [(0.025, 0.032, radians(60)), (0.032, 0.025, radians(55))])
-def test_friction_needed_to_topple_is_that_of_newton_and_euler(width: float, height: float, slope: float) -> None:
-    # unknowns: acceleration along (down the slope) and away from it, spin rate, friction (up the slope), normal force;
-    # the lower edge lies at (width/2, -height/2) from the centre and does not move
-    x, y, inertia = width / 2, -height / 2, (width**2 + height**2) / 12
-    rows = [[1, 0, 0, 1, 0], [0, 1, 0, 0, -1], [0, 0, inertia, -y, -x], [1, 0, -y, 0, 0], [0, 1, x, 0, 0]]
-    weight = np.array([G * sin(slope), -G * cos(slope), 0.0, 0.0, 0.0])
-    *_, friction, normal = np.linalg.solve(np.array(rows), weight)
-    assert forms.rolling_friction_limit(width, height, slope) == pytest.approx(friction / normal)
-    assert width / height < friction / normal < np.tan(slope)
-    limit = forms.toppling_slope(width, height)
-    assert forms.rolling_friction_limit(width, height, limit) == pytest.approx(np.tan(limit))
-
-
-def test_ladder_is_in_balance_with_the_friction_it_needs() -> None:
-    slope, length, thickness = radians(60), 1.0, 0.01
-    # corners of the ladder's under side touch ground and wall; coordinates from the foot, the wall to the left
-    axis, across = np.array([-cos(slope), sin(slope)]), np.array([sin(slope), cos(slope)])
-    head, centre = length * axis, 0.5 * (length * axis + thickness * across)
-    wall = -centre[0] * G / head[1]  # moments about the foot, per mass
-    assert forms.ladder_friction(slope, thickness / length) == pytest.approx(wall / G)
-    assert forms.ladder_friction(slope, 0.0) == pytest.approx(0.2887, abs=5e-5)
-
-
-def test_housner_ratio_keeps_angular_momentum_of_every_particle() -> None:
-    part = (np.arange(200) + 0.5) / 200 - 0.5
-    x, y = np.meshgrid(part * 0.010, part * 0.040)  # points of the rectangle's mass about its centre, all alike
-    old_x, new_x, up = x - 0.005, x + 0.005, y + 0.020  # arms from the old pivot (right) and the new one (left)
-    before = float(np.sum(new_x * old_x + up * up))  # arms from the new pivot, velocities about the old one
-    after = float(np.sum(new_x**2 + up**2))
-    assert forms.housner_ratio(0.010, 0.040) == pytest.approx(before / after, rel=1e-4)
-    assert forms.housner_ratio(0.010, 0.040) == pytest.approx(0.9118, abs=5e-5)
-
-
-def test_the_first_domino_falls_as_integrated() -> None:
-    def strikes(_: float, state: np.ndarray) -> float:
-        return float(state[0] - ROW.strike)
-
-    strikes.terminal = True  # type: ignore[attr-defined]
-    torque = solve_ivp(
-        lambda _, y: [y[1], 0.5 * (sin(y[0]) - ROW.thickness * cos(y[0])) / ROW.inertia],
-        (0.0, 10.0),
-        [0.0, 1.0],
-        events=strikes,
-        rtol=1e-10,
-        atol=1e-12,
-    )
-    assert ROW.collision_times(1, 1.0)[0] == pytest.approx(float(torque.t_events[0][0]), rel=1e-5)
 
 
 @pytest.mark.parametrize(("gap", "speed"), [(0.2, 1.35), (0.7, 1.09)])

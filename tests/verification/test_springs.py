@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan, atan2, cos, radians, sin, sqrt, tan
+from math import atan2, cos, radians, sin, sqrt, tan
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -86,22 +86,6 @@ def test_wedge_slides_in_between_jaws_with_the_force_of_limit_equilibrium(fricti
     run = CaseScene(bodies, restitution=0.0, friction=friction, ground_friction=0.0).start().to_time(0.005)
     assert run.bodies.vy[0] == pytest.approx(-sinks * run.time, rel=1e-3)
     assert run.bodies.vx[1] == pytest.approx(sinks * run.time * tan(BETA), rel=1e-3)
-
-
-@pytest.mark.parametrize(("degrees", "slides"), [(-0.5, False), (0.5, True)])
-def test_slope_holds_a_polygon_below_the_friction_angle_only(degrees: float, slides: bool) -> None:
-    outline, tilt = regular(6, RADIUS), atan(0.3) + radians(degrees)
-    lifted = tuple((x, y - min(y for _, y in outline)) for x, y in outline)
-    values: dict[str, object] = {"ground_friction": 0.3, "tilt": -tilt, "contact": {"stiffness_scale": 0.01}}
-    run = CaseScene([table(lifted)], restitution=0.0, **values).start().to_time(0.05)  # type: ignore[arg-type]
-    place, speed, began = float(run.bodies.x[0]), float(run.bodies.vx[0]), run.time
-    run.to_time(0.1)
-    if slides:
-        rate = G * (sin(tilt) - 0.3 * cos(tilt))
-        assert run.bodies.vx[0] - speed == pytest.approx(rate * (run.time - began), rel=1e-4)
-    else:
-        assert abs(run.bodies.x[0] - place) < 1e-9
-    assert abs(run.bodies.angle[0]) < 1e-5
 
 
 def test_hexagon_that_rolls_onto_its_next_face_keeps_eleven_seventeenths_of_its_spin() -> None:

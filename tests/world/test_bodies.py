@@ -151,23 +151,6 @@ def test_nothing_falls_through_a_valley(model: str) -> None:
     assert scene.contacts > 0
 
 
-@pytest.mark.parametrize("model", MODELS)
-def test_leaning_wall_sends_a_block_back_with_the_restitution_asked(model: str) -> None:
-    """A block comes flat against a wall, smooth so that it does not turn."""
-    slope, e = 1.0, 0.5
-    out = np.array([-sin(slope), cos(slope)])  # of the wall, towards the block
-    foot, top = np.array([0.5, 0.5]), np.array([0.5, 0.5]) + 0.2 * np.array([cos(slope), sin(slope)])
-    middle = 0.5 * (foot + top) + (HEIGHT / 2 + 1e-4) * out
-    body = {"x": middle[0], "y": middle[1], "angle": slope, "velocity": (-0.7 * out).tolist()}
-    wall = {"from": foot.tolist(), "to": top.tolist()}
-    scene = scene_of([body], model=model, restitution=e, walls=[wall], gravity=0.0, friction={"block_ground": 0.0})
-    scene.to_time(0.01)
-    assert scene.contacts == 0
-    vx, vy = scene.bodies[0].vx, scene.bodies[0].vy
-    assert out @ (vx, vy) == pytest.approx(0.7 * e, abs=0.007)
-    assert scene.bodies[0].spin == pytest.approx(0.0, abs=0.05)
-
-
 WITH_PARTICLES = ["kernel", "particles"]
 
 

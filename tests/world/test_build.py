@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from math import ceil
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import (
@@ -17,7 +15,6 @@ from blocksim.kernels.common.arrays import (
 from blocksim.verification.scene import scenario_of
 from blocksim.world import memory
 from blocksim.world.build import (
-    GROWTH,
     MOST_LARGE,
     build_world,
     cell_radius,
@@ -43,25 +40,6 @@ def test_rest_is_looked_for_only_where_it_may_stop_the_run() -> None:
     held = controls.rest_checks * controls.check_every * controls.step
     assert 0.02 <= held < 0.0203
     assert build_world(scenario(time={"rest_hold": 0.0})).controls[0].rest_checks == 1
-
-
-def test_more_room_keeps_what_there_is() -> None:
-    world = build_world(scenario(contact={"model": "kernel", "particle_spacing": 4e-3}))
-    world.pairs.a[:] = np.arange(world.pairs.size)
-    world.contacts.spring[:] = 7.0
-    world.candidates[:] = 3
-    world.operators.h_one[:] = 5.0
-    world.pairs.normal_left[:] = 5
-    wider = with_more_room(world)
-    used = world.pairs.size
-    assert wider.pairs.size == len(wider.candidates) == ceil(GROWTH * used)
-    for name in ("pairs", "contacts", "candidates", "operators"):
-        old, new = getattr(world, name), getattr(wider, name)
-        assert (new[:used] == old).all(), name
-        assert not new[used:].view(np.uint8).any(), name
-        assert (new.dtype, new.shape) == (old.dtype, (wider.pairs.size, *old.shape[1:])), name
-    assert wider.ledger is world.ledger
-    assert wider.bodies is world.bodies
 
 
 @pytest.mark.parametrize("more", [0, GROUP - 2, GROUP - 1, 3 * GROUP])

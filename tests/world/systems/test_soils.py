@@ -1,8 +1,6 @@
 """Soils at time zero: yield surface, pressure at rest, friction, step; and what is shown of them."""
 
 import math
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -102,12 +100,6 @@ def test_check_tells_whose_step_is_taken_and_which_stiffness_makes_both_equal() 
 
 def test_the_ledger_names_energies_in_the_order_in_which_they_are_measured() -> None:
     assert SOILS.energies == arrays.ENERGIES
-
-
-def test_stored_runs_are_read_without_the_compiler() -> None:
-    found = "any(name.startswith(('numba', 'blocksim.kernels')) for name in sys.modules)"
-    code = f"import sys, blocksim.world.systems; sys.exit({found})"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_arrays_of_soil_take_as_many_bytes_as_check_estimates() -> None:
