@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from math import isnan, sqrt
+from math import cos, isnan, radians, sin, sqrt
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Case, CaseOutcome, Row, Setting, at_least, run_case
 from blocksim.verification.cases import CASES, SettingError, choose_cases, exclusions
 from blocksim.verification.reference import (
@@ -181,6 +183,28 @@ def test_limit_is_found_to_half_of_the_last_interval_where_the_outcome_changes()
     assert limit(lambda value: value > 0.3, 0.0, 1.0, 10) == pytest.approx(0.3, abs=2.0**-11)
     assert math.isnan(limit(lambda value: value > -1.0, 0.0, 1.0, 10))
     assert math.isnan(limit(lambda value: value > 2.0, 0.0, 1.0, 10))
+
+
+@pytest.mark.parametrize(("width", "height", "slope"), [(0.025, 0.032, radians(60)), (0.032, 0.025, radians(55))])
+def test_friction_needed_to_topple_is_that_of_newton_and_euler(width: float, height: float, slope: float) -> None:
+    # unknowns: acceleration along (down the slope) and away from it, spin rate, friction (up the slope), normal force;
+    # the lower edge lies at (width/2, -height/2) from the centre and does not move
+    x, y, inertia = width / 2, -height / 2, (width**2 + height**2) / 12
+    rows = [[1, 0, 0, 1, 0], [0, 1, 0, 0, -1], [0, 0, inertia, -y, -x], [1, 0, -y, 0, 0], [0, 1, x, 0, 0]]
+    weight = np.array([9.81 * sin(slope), -9.81 * cos(slope), 0.0, 0.0, 0.0])
+    *_, friction, normal = np.linalg.solve(np.array(rows), weight)
+    assert forms.rolling_friction_limit(width, height, slope) == pytest.approx(friction / normal)
+    assert width / height < friction / normal < np.tan(slope)
+    limit = forms.toppling_slope(width, height)
+    assert forms.rolling_friction_limit(width, height, limit) == pytest.approx(np.tan(limit))
+
+
+def test_a_strike_loses_energy_and_no_other_spin_would_be_nearer_to_the_old_ones() -> None:
+    before = np.append(0.0, ROW.lean(ROW.strike, 5)[1])  # the struck domino first, at rest
+    rates, spin = ROW.lean(0.0, 6)[1], ROW.struck_spin(5, 1.0)
+    left = [float(np.sum((before - other * rates) ** 2)) for other in (0.99 * spin, spin, 1.01 * spin)]
+    assert left[1] < min(left[0], left[2])
+    assert spin**2 * float(rates @ rates) < float(before @ before)
 
 
 @pytest.mark.parametrize(("gap", "speed"), [(0.2, 1.35), (0.7, 1.09)])
