@@ -45,5 +45,4 @@ def folder(kept: Result) -> Path:
 
 @pytest.fixture
 def copy(folder: Path, tmp_path: Path) -> Path:
-    """Give a copy of that folder."""
     return Path(shutil.copytree(folder, tmp_path / "run"))

@@ -17,7 +17,6 @@ RAMP = {"kind": "ramp", "to": "2 mm", "rate": "20 mm/s"}
 
 
 def pushed(scheme: str, end: float | None = None, **jack: Any) -> Scenario:
-    """Return a brick on the ground with an actuator."""
     time = {"scheme": scheme, "stop_at_rest": False} | ({} if end is None else {"end": end})
     data = {
         "schema": 1,

@@ -185,7 +185,6 @@ def test_folder_that_need_not_be_brought_to_the_disk_is_no_failure(
 
 @pytest.fixture
 def umask() -> Iterator[None]:
-    """Restore the umask."""
     before = os.umask(0o022)
     yield
     os.umask(before)

@@ -119,7 +119,7 @@ def test_particles_do_not_lose_one_another(model: str, what: str) -> None:
         stays_or_says(simulate(thrown(what, speed, **contact)), BODIES[what], 0.0 if what == "ground" else FACE, limit)
 
 
-@pytest.mark.parametrize("spin", [30.0, 1e3, 1e4])
+@pytest.mark.parametrize("spin", [30.0, 1e4])
 @stiffnesses
 def test_rod_that_swings_does_not_pass_through_a_plate(spin: float, scale: float) -> None:
     """Its centre rests; only its end is fast."""

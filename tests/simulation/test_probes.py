@@ -32,7 +32,6 @@ PROBES: list[dict[str, Any]] = [
 
 
 def scene(scheme: str, probes: list[dict[str, Any]], end: float = 0.3, **tables: Any) -> Scenario:
-    """Return two bricks, one on the other, on the ground."""
     data: dict[str, Any] = {
         "schema": 1,
         "name": "a",

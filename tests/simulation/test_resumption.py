@@ -59,7 +59,6 @@ def points(whole: Result, seed: str, count: int) -> list[int]:
 
 
 def sliding_seen(name: str) -> Scenario:
-    """Return a model's scenario with its contacts recorded."""
     return sliding({**MODELS[name], "output": {"contacts": True}}, end=0.02)
 
 
@@ -103,7 +102,6 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def begun(interrupted: Path, tmp_path: Path) -> Path:
-    """Return a copy of the run that was interrupted."""
     return Path(shutil.copytree(interrupted, tmp_path / "begun"))
 
 
@@ -117,17 +115,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 def newest(folder: Path) -> Path:
     return max(folder.glob("checkpoint.*"), key=lambda path: read_checkpoint(path).head.position.step)
-
-
-def test_frames_after_the_checkpoint_are_kept_once_and_that_of_the_interruption_goes(
-    begun: Path, whole: Result
-) -> None:
-    newest(begun).unlink()  # as if it had been killed before it wrote this one
-    assert 1000 not in whole.frames.step
-    resumed = simulate_into(sliding({}), begun, resume=True)
-    assert resumed.summary.resumed_from == (500,)
-    assert resumed.summary.warnings == ()
-    assert_same(whole, resumed)
 
 
 def test_damaged_checkpoint_falls_back_to_the_older_one_and_none_that_is_whole_is_told(
@@ -148,7 +135,6 @@ def test_damaged_checkpoint_falls_back_to_the_older_one_and_none_that_is_whole_i
 
 
 def refusal(folder: Path, scenario: Scenario) -> str:
-    """Return why a run is not continued."""
     with pytest.raises(InvalidInputError) as caught:
         simulate_into(scenario, folder, resume=True)
     return str(caught.value)
@@ -245,7 +231,6 @@ def test_scene_comes_back_to_the_last_bit_in_arrays_of_the_same_types(tmp_path: 
 
 @pytest.fixture
 def written(tmp_path: Path) -> Path:
-    """Return a whole checkpoint, to be damaged."""
     write_checkpoint(tmp_path / "checkpoint.0", build_scene(SCENARIO), at(100), origin_of(SCENARIO))
     return tmp_path / "checkpoint.0"
 

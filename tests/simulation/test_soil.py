@@ -41,7 +41,6 @@ BLOCKS = {"any": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "s
 
 
 def place(soil: Soil, number: int, **values: float) -> None:
-    """Put a particle somewhere else, with another velocity."""
     for name, value in values.items():
         soil.soils.points[name][soil.soils.states["number"] == number] = value
     soil.soils.controls.is_listed[0] = 0
@@ -183,13 +182,11 @@ ALONE = data_of(column(0.04, 0.04, 0.005), walls=[LEFT], end=0.06, output={"ever
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Result:
-    """Run a column that collapses against a block."""
     return blocksim.run(SCENE, out=tmp_path_factory.mktemp("soil") / "run")
 
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory: pytest.TempPathFactory) -> Result:
-    """Run a column without any block."""
     return blocksim.run(scenario_from_mapping(ALONE), out=tmp_path_factory.mktemp("alone") / "run")
 
 

@@ -39,7 +39,6 @@ def plate(motion: Mapping[str, object] | None = None, *, width: float = 0.3, **k
 
 
 def block(**keys: Any) -> dict[str, Any]:
-    """Return the paper's block on the plate."""
     return {"y": 0.1 + keys.get("height", HEIGHT) / 2, "name": "block", **keys}
 
 
@@ -301,7 +300,6 @@ def settled_scene(scenario: Scenario) -> tuple[Any, Any]:
 
 
 def support_force(scene: Any) -> float:
-    """Return the size (N) of the force of the ground."""
     return force_of(scheme_of(scene).contacts(scene, scene.world.bodies.size - 1))
 
 

@@ -27,15 +27,12 @@ PIECES = 100  # fixed stones below a block, whose springs are those of an elasti
 
 
 class Settled(NamedTuple):
-    """A scene at rest, and the steps that it took."""
-
     world: Any
     contacts: trajectory.Rows
     steps: int
 
     @property
     def places(self) -> Any:
-        """Centres and angles, (3, b)."""
         return np.stack([self.world.bodies[name][:-1] for name in ("x", "y", "angle")])
 
 

@@ -88,7 +88,6 @@ def ending(stack: Stack, bodies: Sequence[Body], scheme: str) -> NDArray[np.floa
 
 
 def time_of(scheme: str) -> float:
-    """Return when states are compared (s)."""
     return RIGID_TIME if scheme == RIGID else BEFORE_CHAOS
 
 

@@ -81,7 +81,6 @@ def bodies_of(pair: Pair, size: float, *, gap: float) -> list[dict[str, object]]
 
 
 def smallest(bodies: Sequence[dict[str, object]]) -> float:
-    """Return the smallest side (m)."""
     return min(float(str(body[name])) for body in bodies for name in ("width", "height"))
 
 

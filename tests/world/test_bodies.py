@@ -56,19 +56,16 @@ def scene_of(
 
 
 def slabs_of(**tables: Any) -> tuple[Records, tuple[Any, ...]]:
-    """Return the slabs and the placed pieces that they stand for."""
     scenario = scenario_of([{"y": 10.0}], **tables)
     slabs: Any = build_world(scenario).bodies[1:-1]
     return slabs, place_segments(scenario)
 
 
 def block_state(scene: Simulation) -> np.ndarray:
-    """Return the state of the first block."""
     return np.asarray(scene.state()[0])
 
 
 def corners(body: Record) -> np.ndarray:
-    """Return the corners (4, 2)."""
     local = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * (body.half_x, body.half_y)
     c, s = cos(body.angle), sin(body.angle)
     return np.asarray(local @ np.array([[c, s], [-s, c]]) + (body.x, body.y))
@@ -98,7 +95,6 @@ def test_upper_faces_of_slabs_are_the_line_of_the_profile(steps: list[tuple[floa
 
 
 def turned(vector: Sequence[float], angle: float) -> list[float]:
-    """Return a vector turned by an angle (rad)."""
     x, y = vector
     return [x * cos(angle) - y * sin(angle), x * sin(angle) + y * cos(angle)]
 

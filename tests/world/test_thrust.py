@@ -108,7 +108,6 @@ def own_step(scenario: Scenario) -> float:
 
 
 def is_settled(scenario: Scenario) -> bool:
-    """Return whether a scene comes to rest before time zero."""
     built = build(scenario)
     try:
         settle(built.scene, scenario, built.placed, ALONE)
@@ -178,7 +177,6 @@ def heavy_on_light(ratio: float, *, x: float = 0.0, gap: float = 0.0, **time: An
 
 
 def cube_on_two() -> Scenario:
-    """Return a cube of 1 m on two of 50 mm."""
     small = {"y": 0.025, "width": 0.05, "height": 0.05}
     cube = {"y": 0.55, "width": 1.0, "height": 1.0, "length": 1.0}
     time = {"scheme": "nonsmooth", "step": 1e-3, "end": 10.0}

@@ -144,8 +144,6 @@ def test_cells_of_polygons_have_their_own_corners(tmp_path: Path) -> None:
 
 
 class Reader:
-    """VTK's own reader of a file."""
-
     def __init__(self, path: Path) -> None:
         hdf = pytest.importorskip("vtkmodules.vtkIOHDF", reason="reading back needs the extra paraview-check (vtk)")
         self.reader = hdf.vtkHDFReader()

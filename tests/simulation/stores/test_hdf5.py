@@ -161,7 +161,6 @@ Change = Callable[[h5py.File], None]
 
 @pytest.fixture(scope="module")
 def two_blocks() -> Scenario:
-    """Return two blocks."""
     return scenario_of([{"y": 0.0125}, {"y": 0.0375}])
 
 
@@ -179,7 +178,6 @@ def files(two_blocks: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 @pytest.fixture
 def refusal(two_blocks: Scenario, files: Path, tmp_path: Path) -> Callable[[Change], str]:
-    """Change a run file, and return why it is refused."""
 
     def refuse(change: Change) -> str:
         path = Path(shutil.copyfile(files / "closed.h5", tmp_path / "run.h5"))
@@ -193,7 +191,6 @@ def refusal(two_blocks: Scenario, files: Path, tmp_path: Path) -> Callable[[Chan
 
 
 def put(name: str, link: object = None, **keys: Any) -> Change:
-    """Put a link, or another data set, in the place of a member."""
 
     def change(file: h5py.File) -> None:
         del file[name]

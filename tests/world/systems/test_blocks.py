@@ -24,7 +24,6 @@ SCENARIOS = Path(__file__).parents[3] / "scenarios"
 
 @pytest.fixture(scope="module")
 def fallen() -> Result:
-    """Run the paper's three blocks."""
     return blocksim.run(SCENARIOS / "three_blocks.toml")
 
 
