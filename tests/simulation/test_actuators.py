@@ -7,32 +7,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario import Scenario
 from blocksim.scenario.models.actuators import PathTable, stretches_of
 from blocksim.simulation import simulate
+from tests.simulation.test_probes import WEIGHT, both, scene
 
-both = pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
-WEIGHT = 1000 * 0.2 * 0.1 * 0.1 * 9.81  # N
 RAMP = {"kind": "ramp", "to": "2 mm", "rate": "20 mm/s"}
 
 
 def pushed(scheme: str, end: float | None = None, **jack: Any) -> Scenario:
-    time = {"scheme": scheme, "stop_at_rest": False} | ({} if end is None else {"end": end})
-    data = {
-        "schema": 1,
-        "name": "a",
-        "materials": {"oak": {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}},
-        "blocks": {"brick": {"width": 0.2, "height": 0.1, "length": 0.1, "material": "oak"}},
-        "bodies": [{"block": "brick", "name": "b", "x": 0.0, "y": 0.05}],
-        "friction": {"block_ground": 0.5},
-        "contact": {"restitution": 0.0} | ({} if scheme == "nonsmooth" else {"stiffness_scale": 0.01}),
-        "start": {"settle": True},
-        "time": time,
-        "output": {"every": "1 ms"},
-        "events": jack.pop("events", []),
-        "actuators": [{"name": "jack", "body": "b", "displacement": RAMP, **jack}],
-    }
-    return scenario_from_mapping(data)
+    return scene(
+        scheme,
+        [],
+        structures=[],
+        bodies=[{"block": "brick", "name": "b", "x": 0.0, "y": 0.05}],
+        friction={"block_ground": 0.5},
+        contact={"restitution": 0.0} | ({} if scheme == "nonsmooth" else {"stiffness_scale": 0.01}),
+        start={"settle": True},
+        time={"scheme": scheme, "stop_at_rest": False} | ({} if end is None else {"end": end}),
+        output={"every": "1 ms"},
+        events=jack.pop("events", []),
+        actuators=[{"name": "jack", "body": "b", "displacement": RAMP, **jack}],
+    )
 
 
 @both

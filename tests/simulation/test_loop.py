@@ -23,7 +23,7 @@ from blocksim.simulation.balance import FIRST_CHECK, EnergyLedger
 from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
 from blocksim.simulation.instruments import Recorder
 from blocksim.simulation.interruption import interruptible, stop_requests
-from blocksim.simulation.loop import BY_CODE, CALL_SECONDS, MOST_GROWTH, RESIDUAL, Outcome, diagnose, steps_of_call
+from blocksim.simulation.loop import BY_CODE, RESIDUAL, Outcome, diagnose
 from blocksim.simulation.provenance import state_hash
 from blocksim.simulation.schemes import (
     ALONE,
@@ -79,16 +79,6 @@ def test_rare_output_does_not_make_the_loop_deaf(soft: Shipped, wanted: int) -> 
     assert len(seen) == wanted
     assert recorder.steps == sorted({0, *seen[-1:]})
     assert all(np.diff([0, *seen, recorder.next_step(0)]) > 0)
-
-
-@pytest.mark.parametrize("seconds_a_step", [1e-7, 0.5])
-def test_calls_come_to_last_as_long_as_wanted(seconds_a_step: float) -> None:
-    steps = 25_000
-    for _ in range(20):
-        steps = steps_of_call(steps, steps, steps * seconds_a_step)
-    assert steps * seconds_a_step == pytest.approx(max(CALL_SECONDS, seconds_a_step), rel=0.01)
-    assert steps_of_call(25_000, 1, 0.0) <= MOST_GROWTH * 25_000  # quick first steps do not make a call endless
-    assert steps_of_call(1, 1, 1e6) == 1
 
 
 ENTRIES = dict.fromkeys(sorted(set(EnergyLedger.model_fields) - {"start", "in_play"}), 0.0)

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.errors import ExitCode, StoppedEarlyError
+from blocksim.errors import StoppedEarlyError
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.motion import drives_of
 from blocksim.simulation import Result, read_result, simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.rest_state import SettleError, initial_scene, settle
 from blocksim.simulation.schemes import ALONE, build, scheme_of
-from blocksim.statics import spring_equilibrium
-from blocksim.study.criterion import DEFAULT, Stability, read_criterion
 from blocksim.verification.scene import HEIGHT, PaperBlock, scenario_of
 
 if TYPE_CHECKING:
@@ -415,35 +413,6 @@ def test_what_is_to_drop_or_moves_already_does_not_settle_unasked_under_such_a_s
         assert result.summary.settled is None
         assert result.frames.y[0, 0] == body["y"]
         assert result.summary.warnings == ()
-
-
-def tilted_ring(tilt: str) -> Scenario:
-    """Return a ring of eight stones on springs, which falls from 17.44 degrees on."""
-    ring = {"kind": "arch", "block": "b", "radius": 0.2, "thickness": 0.03, "embrace": "162 deg", "count": 8}
-    return stack(
-        "explicit",
-        blocks={"b": {"depth": 0.1, "material": "stone"}},
-        bodies=[],
-        structures=[ring],
-        friction=1.0,
-        contact={"restitution": 0.0, "stiffness_scale": 3.0},
-        ground={"tilt": tilt},
-    )
-
-
-def nothing_is_known(scene: Any, _advance: Any, is_free: Any, *_: float) -> spring_equilibrium.SpringRest:
-    """Be a search for an equilibrium without time that does not come to an end."""
-    return spring_equilibrium.SpringRest(scene, None, np.zeros((3, is_free.size)), np.inf)
-
-
-def test_a_mechanism_on_springs_is_told_before_it_has_gone_far(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(spring_equilibrium, "equilibrium", nothing_is_known)
-    with pytest.raises(SettleError, match=r"block \S+ moves at .* has come 0\.0\d+ mm, after \d+ steps") as caught:
-        simulate(tilted_ring("19 deg"))
-    assert caught.value.exit_code == ExitCode.NUMERICAL_FAILURE
-    row = {"status": "failed", "reason": str(caught.value)}
-    assert read_criterion(DEFAULT).verdict(row) is Stability.FALLS
-    assert int(str(caught.value).split()[-2]) < 100_000
 
 
 def test_what_closes_a_gap_and_then_rests_is_no_mechanism() -> None:

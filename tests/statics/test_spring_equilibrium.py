@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pytest
 
+from blocksim.errors import ExitCode
 from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation.rest_state import SettleError, settle
 from blocksim.simulation.schemes import ALONE, build, scheme_of
 from blocksim.statics import spring_equilibrium
+from blocksim.study.criterion import DEFAULT, Stability, read_criterion
 
 if TYPE_CHECKING:
     from blocksim.simulation import trajectory
@@ -163,3 +165,22 @@ def test_it_is_the_state_in_which_growing_loads_come_to_rest(monkeypatch: pytest
     assert len(at_once.contacts) == len(in_parts.contacts)
     overlaps = (np.sort(one.contacts["overlap"]) for one in (at_once, in_parts))
     assert np.abs(np.subtract(*overlaps)).max() < 1e-3 * deepest
+
+
+def test_a_mechanism_is_told_before_it_has_gone_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ring of eight stones, which falls from 17.44 degrees on."""
+    monkeypatch.setattr(spring_equilibrium, "equilibrium", nothing_is_known)
+    ring = {"kind": "arch", "block": "b", "radius": 0.2, "thickness": 0.03, "embrace": "162 deg", "count": 8}
+    falling = block(
+        blocks={"b": {"depth": 0.1, "material": "stone"}},
+        bodies=[],
+        structures=[ring],
+        friction={"block_block": 1.0, "block_ground": 1.0},
+        contact={"restitution": 0.0, "stiffness_scale": 3.0},
+        ground={"tilt": "19 deg"},
+    )
+    with pytest.raises(SettleError, match=r"block \S+ moves at .* has come 0\.0\d+ mm, after \d+ steps") as caught:
+        settled(falling)
+    assert caught.value.exit_code == ExitCode.NUMERICAL_FAILURE
+    assert read_criterion(DEFAULT).verdict({"status": "failed", "reason": str(caught.value)}) is Stability.FALLS
+    assert int(str(caught.value).split()[-2]) < 100_000

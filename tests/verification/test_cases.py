@@ -97,24 +97,21 @@ def test_case_of_soil_is_as_the_table_has_it(case: Case) -> None:
     assert missed(run_case(case, Setting())) == [row.quantity for row in kept if not row.is_inside]
 
 
-RECTANGLES = (
+RIGID_LONG = {"V3", "V4", "V9", "V10", "V13", "V15", "V17", "V18", "V23", "V26"}
+RECTANGLES = [
+    *((case, SETTINGS[RIGID], case.id in RIGID_LONG) for case in cases_of(RIGID)),
+    *((case, Setting(quick=True), case.id == "V3") for case in choose_cases(["V3", "V5", "V6", "V7", "V8"], Setting())),
+    *((case, Setting(quick=True), case.id != "S7") for case in SOIL_CASES if case.id in {"S5", "S6", "S7", "S11"}),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "setting"),
     [
-        pytest.param(case, SETTINGS[RIGID], id=f"{case.id}-{RIGID}", marks=LONG if is_long else ())
-        for case in cases_of(RIGID)
-        for is_long in [case.id in {"V3", "V4", "V9", "V10", "V13", "V15", "V17", "V18", "V23", "V26"}]
-    ]
-    + [
-        pytest.param(case, Setting(quick=True), id=f"{case.id}-linear", marks=LONG if case.id == "V3" else ())
-        for case in choose_cases(["V3", "V5", "V6", "V7", "V8"], Setting())
-    ]
-    + [
-        pytest.param(case, Setting(quick=True), id=case.id, marks=LONG if case.id != "S7" else ())
-        for case in choose_cases(["S5", "S6", "S7", "S11"], Setting(), soil=True)
-    ]
+        pytest.param(case, setting, id=f"{case.id}-{setting.scheme}", marks=LONG if is_long else ())
+        for case, setting, is_long in RECTANGLES
+    ],
 )
-
-
-@pytest.mark.parametrize(("case", "setting"), RECTANGLES)
 def test_rectangles_given_as_outlines_have_the_same_answers(
     case: Case, setting: Setting, monkeypatch: pytest.MonkeyPatch
 ) -> None:

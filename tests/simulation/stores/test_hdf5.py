@@ -124,14 +124,6 @@ def test_outlines_are_stored_once_and_rectangles_store_none(scenario: Scenario, 
         np.testing.assert_array_equal(stored[1], others[0].corners)
 
 
-def test_a_flush_that_takes_long_is_a_tenth_of_the_time_at_most(scenario: Scenario, tmp_path: Path) -> None:
-    with opened(tmp_path / "run.h5", place_bodies(scenario)) as sink:
-        for took, waiting in ((60.0, 1), (0.0, 0)):
-            sink.flushed_at, sink.flush_seconds = time.monotonic() - 300.0, took
-            add_frames(sink, 0, 1)
-            assert len(sink.waiting) == waiting
-
-
 def test_full_disk_is_one_message_and_the_file_stays_readable(
     scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
