@@ -34,20 +34,6 @@ def brick(width: float, height: float, depth: float = 1.0) -> dict[str, object]:
     return {"width": width, "height": height, "length": depth, "material": "stone"}
 
 
-def flush_wall(courses: int, whole: int, width: float, height: float, first: str = "whole") -> list[dict[str, Any]]:
-    """Return a wall in running bond whose ends are closed by halves."""
-    bodies = []
-    for course in range(courses):
-        is_whole = (course % 2 == 0) == (first == "whole")
-        pieces = [1.0] * whole if is_whole else [0.5, *[1.0] * (whole - 1), 0.5]
-        x = 0.0
-        for piece in pieces:
-            name = "brick" if piece == 1.0 else "half"
-            bodies.append({"block": name, "x": x + 0.5 * piece * width, "y": (course + 0.5) * height})
-            x += piece * width
-    return bodies
-
-
 def pushed(blocks: Blockwork, sign: float = 1.0) -> Equilibrium:
     found = Programme(blocks).greatest(blocks.forces, sign * blocks.horizontal)
     assert found is not None
@@ -109,8 +95,7 @@ def test_below_a_head_that_stays_parallel_a_wall_carries_what_virtual_work_says(
 
 
 def test_forces_are_in_equilibrium_and_in_their_cones_and_the_mechanism_does_the_work_that_the_factor_says() -> None:
-    sizes = {"brick": brick(0.2, 0.1), "half": brick(0.1, 0.1)}
-    blocks = blockwork(0.4, blocks=sizes, bodies=flush_wall(5, 4, 0.2, 0.1))
+    blocks = Blockwork.of(load_scenario("scenarios/tilting_wall.toml", {"ground.tilt": "0 deg"}))
     found = pushed(blocks)
     assert (found.normal >= -1e-9).all()
     assert (np.abs(found.shear) <= blocks.friction * found.normal + 1e-6).all()
@@ -124,21 +109,6 @@ def test_forces_are_in_equilibrium_and_in_their_cones_and_the_mechanism_does_the
     dead, live = ((found.mechanism * forces).sum() for forces in (blocks.forces, blocks.horizontal))
     assert live > 0.0
     assert -dead / live == pytest.approx(found.factor, rel=1e-6)  # virtual work; dilatant joints take none
-
-
-def test_size_density_and_a_mirror_change_no_factor() -> None:
-    def factors(scale: float, density: float, mirror: float) -> list[float]:
-        stone = {"stone": STONE["stone"] | {"density": density}}
-        sizes = {"brick": brick(0.2 * scale, 0.1 * scale), "half": brick(0.1 * scale, 0.1 * scale)}
-        bodies = [one | {"x": mirror * one["x"]} for one in flush_wall(4, 3, 0.2 * scale, 0.1 * scale, "half")]
-        bodies = [one for one in bodies if one is not bodies[-1]]  # no symmetric wall
-        blocks = blockwork(0.9, materials=stone, blocks=sizes, bodies=bodies)
-        return [pushed(blocks, mirror * sign).factor for sign in (1.0, -1.0)]
-
-    usual = factors(1.0, 2000.0, 1.0)
-    assert usual[0] != pytest.approx(usual[1])
-    for other in (factors(1e-3, 2000.0, 1.0), factors(100.0, 5000.0, 1.0), factors(1.0, 2000.0, -1.0)):
-        assert other == pytest.approx(usual, rel=1e-7)
 
 
 def test_water_pushes_as_its_integral_and_a_dam_slides_at_the_friction_of_statics() -> None:
