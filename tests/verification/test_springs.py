@@ -14,7 +14,7 @@ from blocksim.scenario.geometry import Corners, centre_outline, regular, section
 from blocksim.verification import impacts
 from blocksim.verification.case import Setting
 from blocksim.verification.impacts import LANDINGS
-from blocksim.verification.scene import GOLDEN, WIDTH, CaseScene, Simulation, Throw, Thrower
+from blocksim.verification.scene import GOLDEN, HEIGHT, WIDTH, CaseScene, Simulation, Throw, Thrower
 from blocksim.world import nonsmooth
 from blocksim.world.build import build_world
 from blocksim.world.interactions import damping_ratio
@@ -162,6 +162,13 @@ def test_rocking_peaks_at_the_default_step_are_those_of_exact_impact_times(
     At 0.8 a restitution of 0.80008 would move the fourth peak of the squat block by 0.9 %.
     """
     assert peaks(width, height, restitution) == pytest.approx(exact, rel=within)
+
+
+def test_energy_that_friction_took_and_nobody_tallied_is_noticed() -> None:
+    slide = SETTING.start([{"y": HEIGHT / 2, "velocity": [0.5, 0.0]}]).to_time(0.1)
+    assert slide.residual() < impacts.RIGID_LEDGER_TOLERANCE
+    slide.scene.contacts.tallies.friction[:] *= 0.999
+    assert slide.residual() > 1e-4
 
 
 def test_energy_from_rebounds_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
