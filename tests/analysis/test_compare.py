@@ -96,9 +96,6 @@ def test_limits_of_a_share_agree_with_scipy(count: int, total: int) -> None:
     assert interval(count, total) == pytest.approx((expected.low, expected.high), abs=1e-9)
     one_sided = stats.binomtest(count, total, alternative="greater").proportion_ci(method="exact")
     assert lower_bound(count, total) == pytest.approx(one_sided.low, abs=1e-9)
-
-
-def test_no_sample_bounds_nothing() -> None:
     assert interval(0, 0) == (0.0, 1.0)
 
 

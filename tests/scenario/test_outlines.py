@@ -115,15 +115,12 @@ def test_polygons_overlap_where_they_have_more_than_edges_in_common(other: geome
     assert geometry.overlap(ELL, moved(0.9, 1.0))
 
 
-def test_a_lattice_fills_a_square_and_keeps_its_discs_inside_a_slope() -> None:
+def test_a_lattice_keeps_its_discs_inside_and_the_weight_above_counts_what_is_there_only() -> None:
     places = geometry.fill_lattice(SQUARE, 0.1)
     assert len(places) == 100
     assert places[0] == pytest.approx([0.05, 0.05])
     sloping = geometry.fill_lattice(SLOPE, 0.05)
     assert geometry.edge_distance(sloping, SLOPE).min() >= 0.499 * 0.05
     assert len(sloping) * 0.05**2 == pytest.approx(1.0, abs=0.05)
-
-
-def test_the_weight_above_counts_what_is_there_only() -> None:
     points = np.array([[0.5, 0.5], [1.5, 0.25], [0.5, 2.5]])
     assert geometry.height_above(ELL, points) == pytest.approx([1.5, 0.75, 0.0])

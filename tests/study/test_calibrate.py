@@ -39,7 +39,7 @@ LENGTH = Prior(OVERLAP, 9.5, 10.5, "mm")
 SCALE = Prior("contact.stiffness_scale", 1e-3, 1.0, log=True)
 
 
-def test_values_are_rounded_to_what_matters_and_never_leave_the_bounds() -> None:
+def test_values_are_rounded_to_what_matters_never_leave_the_bounds_and_are_noticed_there() -> None:
     rounded = FRICTION.value(0.192345678), LENGTH.value(10.123456), SCALE.value(0.00123456)
     assert rounded == (0.1923, "10.123 mm", 0.001235)
     for prior in (FRICTION, LENGTH, SCALE, Prior("gravity", 9.8149, 9.81507)):
@@ -47,9 +47,6 @@ def test_values_are_rounded_to_what_matters_and_never_leave_the_bounds() -> None
             assert prior.low <= prior.number(prior.value(prior.at(share))) <= prior.high
     assert SCALE.at(0.5) == pytest.approx(10**-1.5)  # the middle of the logarithm
     assert FRICTION.at(0.5) == pytest.approx(0.24)
-
-
-def test_values_at_a_bound_are_noticed() -> None:
     assert [FRICTION.lies_at_bound(value) for value in (0.17, 0.3093, 0.172)] == [True, True, False]
     assert [SCALE.lies_at_bound(value) for value in (0.00105, 0.01)] == [True, False]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from contextlib import nullcontext
 from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,11 +23,14 @@ from blocksim.study.converge import (
     refinements_of,
     with_setting,
 )
-from blocksim.study.executors import ensemble as folders
+from blocksim.study.executors import Batch, RunSetting, Task, ensemble as folders, processes
+from blocksim.study.executors.processes import DEAD
 from tests.soils import column, scene
 from tests.study.conftest import SCENARIOS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from blocksim.study.rows import Row
     from tests.golden import Golden
 
@@ -158,6 +162,18 @@ def test_refining_continues_until_the_tolerance_is_met(slide: Scenario, tmp_path
     assert (few.verdict, more.verdict) == (ConvergenceVerdict.NOT_YET, ConvergenceVerdict.CONVERGED)
     assert len(few.levels) < len(more.levels) < 2 + 1 + 6
     assert max(level.change_mm for level in more.levels[-2:]) < 1e-6
+
+
+def test_dead_worker_fails_its_runs_and_says_what_to_do(
+    slide: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def dying(tasks: Iterator[Task], _: RunSetting) -> Iterator[Batch]:
+        yield from (Batch((task,), (DEAD,), 0.0, "") for task in tasks)
+
+    monkeypatch.setattr(processes, "for_rounds", lambda: nullcontext(dying))
+    study = converge(slide, studies=["step"], out=tmp_path, jobs=2).studies[0]
+    assert {level.status for level in study.levels} == {"failed"}
+    assert "rerun the command to repeat this case" in study.own.reason
 
 
 def test_scenario_that_fails_as_it_is_and_one_cut_by_the_end_of_time_say_so(slide: Scenario, tmp_path: Path) -> None:

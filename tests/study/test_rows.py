@@ -5,14 +5,12 @@ import tomllib
 import zlib
 from pathlib import Path
 
-import pytest
-
 from blocksim.scenario import Document
 from blocksim.study.manifest import CaseIndex, Entry, Manifest, read_entries, short_hash
 from blocksim.study.plan import Values, with_sweep
-from blocksim.study.rows import Head, Range, Ranges, as_cell, heads_of
+from blocksim.study.rows import Range, Ranges, as_cell, heads_of
 from tests.golden import Golden
-from tests.study.plans import TILT, cases, plan_of
+from tests.study.plans import cases, plan_of
 
 VARIED: list[dict[str, Values]] = tomllib.loads(Path(__file__).with_name("heads.toml").read_text())["vary"]
 
@@ -24,20 +22,6 @@ def test_numbers_have_the_unit_that_was_typed(nominal: Document, golden: Golden)
         (column,) = heads_of(plan_of(document))
         told.append(f"{column}: {', '.join(repr(column.cell(*row.values())) for row in cases(document).design)}")
     golden("\n".join(told), rules=["digits"])
-
-
-def test_drawn_angles_are_numbers_in_the_unit_of_their_range(nominal: Document) -> None:
-    document = with_sweep(nominal, {TILT: {"from": "1 deg", "to": "3 deg"}}, "lhs", samples=4)
-    (head,) = heads_of(plan_of(document))
-    cells = [head.cell(row[TILT]) for row in cases(document).design]
-    assert str(head) == "ground.tilt [deg]"
-    assert all(isinstance(cell, float) and 1.0 < cell < 3.0 for cell in cells)
-    assert plan_of(document).as_table()[TILT] == {"from": "1 deg", "to": "3 deg"}
-
-
-def test_head_is_read_back_and_bare_keys_of_older_tables_too() -> None:
-    assert (Head.read("ground.tilt [deg]"), Head.read("ground.tilt")) == (Head(TILT, "deg"), Head(TILT))
-    assert Head(TILT, "deg").cell(3.141592653589793) == pytest.approx(180.0)
 
 
 def test_block_without_a_position_is_not_inside(tmp_path: Path) -> None:

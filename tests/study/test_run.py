@@ -17,7 +17,7 @@ from blocksim.simulation.instruments import bytes_of_series
 from blocksim.study.compare import compare, compare_run, compare_sweep
 from blocksim.study.manifest import SweepResult
 from blocksim.study.run import run
-from blocksim.study.run_folder import find_run
+from blocksim.study.run_folder import find_run, read_run
 from blocksim.study.sweep import sweep
 from blocksim.study.verify import verify_run
 from blocksim.world.describe import describe
@@ -78,6 +78,14 @@ def test_final_table_without_one_of_the_blocks_is_named(copy: Path) -> None:  # 
     (copy / "final.csv").write_text("".join(lines[:1] + lines[2:]))
     with pytest.raises(InvalidInputError, match=r"final\.csv: its blocks are not those of scenario\.toml"):
         compare_run(copy)
+
+
+def test_an_interrupted_run_and_a_damaged_summary_are_told(copy: Path, golden: Golden) -> None:
+    told, summary = [], (copy / "run.json").read_text()
+    for text in (summary.replace('"finished"', '"interrupted"'), "{"):
+        (copy / "run.json").write_text(text)
+        told.append(read_run(copy).remark)
+    golden("\n".join(told), rules=["numbers", "counts"])
 
 
 @pytest.fixture(scope="module")
