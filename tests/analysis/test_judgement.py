@@ -1,9 +1,9 @@
 """The table of a sweep, good and bad, and all metrics of it together."""
 
 import functools
+from collections.abc import Callable
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -15,9 +15,6 @@ from blocksim.analysis.metrics import METRICS, Judgement, Settings, judge
 from blocksim.errors import InvalidInputError
 from tests.analysis.metrics.conftest import members_of, table_of
 from tests.golden import Golden
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 PAPER = load_table(Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv")
 BLOCKS = ("1", "2", "3")

@@ -4,18 +4,11 @@ Interpreted kernels take a thousand times longer. Tests then have fewer random e
 farther than an interpreter does in seconds is skipped: shorter ones see the same code.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 from hypothesis import settings
 
 from blocksim.kernels.common.jit import config
-from blocksim.simulation.schemes import Team
-
-if TYPE_CHECKING:
-    from blocksim.simulation.schemes import Scene
+from blocksim.simulation.schemes import Scene, Team
 
 IS_INTERPRETED = bool(config.DISABLE_JIT)
 BODY_STEPS = 1000  # a test, times bodies: a second or two of an interpreter

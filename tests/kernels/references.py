@@ -1,25 +1,17 @@
 """What kernels have to find, worked out in NumPy another way: geometry, and dense matrices of rigid contacts."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from blocksim.kernels.common.arrays import BODY, NORMAL, zeros
+from blocksim.kernels.common.arrays import BODY, NORMAL, Record, Records, zeros
 from blocksim.kernels.nonsmooth import arrays
-from blocksim.kernels.nonsmooth.arrays import FAR
+from blocksim.kernels.nonsmooth.arrays import FAR, Nonsmooth
 from blocksim.kernels.nonsmooth.narrow_phase import Lists, collide_one
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from blocksim.kernels.common.arrays import Record, Records
-    from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-
-    Vector = NDArray[np.float64]
+Vector = NDArray[np.float64]
 
 SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 

@@ -3,45 +3,37 @@
 SI units, angles in rad.
 """
 
-from __future__ import annotations
-
 import copy
 import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import cos, hypot, pi, sin
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.bench.harness import pushed_wall
-from blocksim.kernels.common.arrays import ALL, BODY, MOTION_PIECE, TEAM_SIZE, zeros
+from blocksim.kernels.common.arrays import ALL, BODY, MOTION_PIECE, TEAM_SIZE, Record, Records, World, zeros
 from blocksim.kernels.common.mechanics import renew_rotations
 from blocksim.kernels.common.shapes import place_corners
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.models import contact_points
+from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.motion import load_states
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
 from blocksim.kernels.nonsmooth.packs import gather, pack_all
 from blocksim.kernels.nonsmooth.step import substep
-from blocksim.scenario.geometry import centre_outline, regular
+from blocksim.scenario import Scenario
+from blocksim.scenario.geometry import Corners, centre_outline, regular
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
 from blocksim.world.build import build_world
 from blocksim.world.nonsmooth import with_more_constraints
 from tests.kernels.references import turning
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from blocksim.kernels.common.arrays import Record, Records, World
-    from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-    from blocksim.scenario import Scenario
-    from blocksim.scenario.geometry import Corners
 
 STEP = 1e-3  # s, unless a test says otherwise
 ENDLESS = 1e3  # s: tests step as far as they want

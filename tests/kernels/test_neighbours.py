@@ -1,23 +1,25 @@
 """Distances, cells, and lists of pairs: all that is near, looked at before anything leaves their reach."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from math import cos, sin
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
+from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import (
     NEAR_PAIR,
     PAIR,
+    Floats,
+    Record,
     Records,
     World,
     zeros,
 )
 from blocksim.kernels.common.mechanics import renew_rotations
-from blocksim.kernels.common.neighbours import lay_cells, list_pairs, sort_into_cells, travel
+from blocksim.kernels.common.neighbours import CellGrid, lay_cells, list_pairs, sort_into_cells, travel
 from blocksim.kernels.common.shapes import separation, turn
 from blocksim.kernels.common.tolerances import MOST_UNSEEN, SMALL_TURN
 from blocksim.kernels.explicit.broad_phase import PAIR_SHARE, carry_history, unseen_steps
@@ -29,15 +31,7 @@ from blocksim.world.build import build_world, empty_lists
 from tests.kernels.references import apart as largest_gap, distances, turning
 from tests.kernels.scenes import make_body, pose
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from blocksim.kernels.common.arrays import Floats, Record, Records, World
-    from blocksim.kernels.common.neighbours import CellGrid
-
-    Sides = Callable[[np.random.Generator, int], NDArray[np.float64]]
+Sides = Callable[[np.random.Generator, int], NDArray[np.float64]]
 
 places = st.floats(-0.06, 0.06)
 sides = st.floats(1e-3, 0.05)

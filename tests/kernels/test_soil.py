@@ -1,7 +1,5 @@
 """Soil: the path of a particle, its touches, lists, gradients and forces, and the rows of a geostatic start."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 from typing import Any

@@ -1,10 +1,9 @@
 """Threads that advance one world together: shares of bodies and pairs have the bits of one, and so do their ends."""
 
-from __future__ import annotations
-
 import copy
+from collections.abc import Callable
 from math import nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,9 +17,6 @@ from blocksim.simulation.schemes import ALONE, Team
 from blocksim.verification.scene import HEIGHT
 from blocksim.world.build import with_threads
 from tests.kernels.scenes import SCENES, soft_world, wall
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 def bits(records: Any) -> dict[str, bytes]:

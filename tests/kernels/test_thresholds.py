@@ -1,7 +1,5 @@
 """Numbers of kernels/common/tolerances.py, ten times as large and a tenth of it, of both schemes."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 from typing import Any

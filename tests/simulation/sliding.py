@@ -1,22 +1,14 @@
 """A scene that slides at a high friction for every contact model and law, and runs of it that are interrupted."""
 
-from __future__ import annotations
-
 import os
 import signal
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 from blocksim.analysis.bits import differences
-from blocksim.scenario import scenario_from_mapping
-from blocksim.simulation import read_result, simulate_into
+from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.simulation import Progress, Result, read_result, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
-
-    from blocksim.scenario import Scenario
-    from blocksim.simulation import Progress, Result
 
 MODELS: dict[str, dict[str, dict[str, object]]] = {
     "surface-linear": {"contact": {"model": "surface", "law": "linear"}},

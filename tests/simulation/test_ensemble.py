@@ -1,8 +1,7 @@
 """Members of ensembles end as they would alone, to the last bit; how far blocks have moved, how, which first."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,12 +17,8 @@ from blocksim.world import build, memory
 from blocksim.world.build import SceneStack
 from blocksim.world.memory import SceneTooLargeError, scene_size
 from blocksim.world.step import SkinTooSmallError, StepError
+from tests.golden import Golden
 from tests.simulation.conftest import SCENARIOS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from tests.golden import Golden
 
 WALL = {"stiffness_scale": 1e-3}
 SOFT = {"contact.stiffness_scale": 1e-3, "contact.restitution": 0.2, "time.end": 0.3}

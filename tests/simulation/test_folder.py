@@ -1,7 +1,5 @@
 """Files are whole or not there; nothing that blocksim has not written is removed; no two runs write into one folder."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os
@@ -9,9 +7,9 @@ import shutil
 import stat
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -30,12 +28,8 @@ from blocksim.simulation.trajectory import COLUMNS, csv_text
 from blocksim.study.manifest import Manifest
 from blocksim.view.animation import write_gif, write_mp4
 from blocksim.view.style import open_figure, save_figure
+from tests.golden import Golden
 from tests.simulation.conftest import SCENARIOS, Shipped
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from tests.golden import Golden
 
 
 def content_of(folder: Path) -> dict[str, bytes]:

@@ -1,14 +1,13 @@
 """The loop: frames at the nearest steps, how a run ends, energy that adds up; teams of threads that change no bit."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os
 import signal
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,12 +35,8 @@ from blocksim.simulation.schemes import (
 )
 from blocksim.world import build as world_build
 from blocksim.world.build import arrays_of, build_world
+from tests.simulation.conftest import Shipped
 from tests.simulation.sliding import sliding
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.simulation.conftest import Shipped
 
 
 @pytest.mark.parametrize(

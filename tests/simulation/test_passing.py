@@ -1,24 +1,18 @@
 """No block passes through what it meets: it rebounds as it should, or the run ends with exit code 76 and names both."""
 
-from __future__ import annotations
-
+from collections.abc import Mapping, Sequence
 from math import hypot
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 
 from blocksim.errors import ExitCode
+from blocksim.scenario import Scenario
 from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
-from blocksim.simulation import run_ensemble, simulate
+from blocksim.simulation import Frames, run_ensemble, simulate
+from blocksim.simulation.results import Result
 from blocksim.verification.scene import scenario_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from blocksim.scenario import Scenario
-    from blocksim.simulation import Frames
-    from blocksim.simulation.results import Result
 
 WIDTH, HEIGHT = 0.032, 0.025  # m, of the block that is thrown
 LONG = 0.4  # m, of the plate that it is thrown at

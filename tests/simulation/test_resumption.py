@@ -1,7 +1,5 @@
 """Runs that are interrupted and go on leave the bits of one that is not, or say why not; checkpoints are whole."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,16 +1,15 @@
 """A run from scenario to folder: what it keeps, what its tables say, and that the scenario alone decides its bits."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
 import os
 import platform
+import weakref
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import llvmlite.binding
 import numba
@@ -26,14 +25,10 @@ from blocksim.simulation.run import RunCallbacks, bytes_needed
 from blocksim.simulation.schemes import build_scene, compile_kernels
 from blocksim.simulation.trajectory import COLUMNS, Frames, as_frame, csv_text, final_columns, read_table
 from blocksim.world.step import StepError
+from tests.golden import Golden
 from tests.simulation.conftest import SCENARIOS, Shipped
 from tests.simulation.sliding import sliding
 from tests.view.made_up import blocks_at, polygons
-
-if TYPE_CHECKING:
-    import weakref
-
-    from tests.golden import Golden
 
 FILES = {"scenario.toml", "experiment.csv", "final.csv", "run.h5", "run.json", "done.json"}
 

@@ -1,9 +1,9 @@
 """Scenes that rest before time zero; driven bodies and events do what closed forms say, and the ledger has it all."""
 
-from __future__ import annotations
-
+from collections.abc import Mapping, Sequence
 from math import pi
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,10 +16,6 @@ from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.rest_state import SettleError, initial_scene, settle
 from blocksim.simulation.schemes import ALONE, build, scheme_of
 from blocksim.verification.scene import HEIGHT, PaperBlock, scenario_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
 G = 9.81  # m/s2
 MASS = PaperBlock().mass  # kg

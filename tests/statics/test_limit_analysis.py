@@ -1,9 +1,8 @@
 """Static limit analysis against published factors and closed forms: walls, arches, wedges, blocks on slopes."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +12,6 @@ from blocksim.scenario import load_scenario
 from blocksim.statics.blockwork import Blockwork
 from blocksim.statics.joint_forces import joint_forces
 from blocksim.statics.programme import Equilibrium, Programme, horizontal_margin
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 EXACT = 1e-4  # relative
 STONE = {"stone": {"density": 2000.0, "young_modulus": 1e10, "poisson_ratio": 0.2}}

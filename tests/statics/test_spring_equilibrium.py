@@ -1,24 +1,20 @@
 """Equilibrium on springs, found without time: closed forms of one block, a published wall, and steps of time."""
 
-from __future__ import annotations
-
 import math
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from blocksim.errors import ExitCode
 from blocksim.scenario import Scenario, load_scenario
+from blocksim.simulation import trajectory
 from blocksim.simulation.rest_state import SettleError, settle
 from blocksim.simulation.schemes import ALONE, build, scheme_of
 from blocksim.statics import spring_equilibrium
 from blocksim.study.criterion import DEFAULT, Stability, read_criterion
-
-if TYPE_CHECKING:
-    from blocksim.simulation import trajectory
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 G = 9.81

@@ -1,12 +1,11 @@
 """Studies of convergence: what is refined, what is observed, and what is recommended."""
 
-from __future__ import annotations
-
 import tomllib
+from collections.abc import Iterator
 from contextlib import nullcontext
 from math import radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -25,14 +24,10 @@ from blocksim.study.converge import (
 )
 from blocksim.study.executors import Batch, RunSetting, Task, ensemble as folders, processes
 from blocksim.study.executors.processes import DEAD
+from blocksim.study.rows import Row
+from tests.golden import Golden
 from tests.soils import column, scene
 from tests.study.conftest import SCENARIOS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from blocksim.study.rows import Row
-    from tests.golden import Golden
 
 FAILED: Row = {"status": "failed", "reason": "an overlap exceeds contact.max_overlap", "seconds": 0.1}
 HALVED = Refinement("step", "time step", "time.safety", 0.05, 0.5, 1)

@@ -2,9 +2,9 @@
 
 import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import h5py
+import pandas as pd
 import pytest
 
 import blocksim
@@ -24,9 +24,6 @@ from blocksim.world.describe import describe
 from tests.golden import Golden
 from tests.simulation.test_probes import PROBES, PULSE, scene
 from tests.study.conftest import SCENARIOS
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PAPER = SCENARIOS / "experiments" / "three_blocks.csv"
 BRIEF = {"time.end": 0.002, "contact.stiffness_scale": 0.001}

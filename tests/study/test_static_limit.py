@@ -1,10 +1,9 @@
 """Static limits as a study: exact bounds of loads, brackets of other keys, folder, picture, repetition, refusals."""
 
-from __future__ import annotations
-
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,9 +13,6 @@ from blocksim.study.answer import study_in
 from blocksim.study.limit import limit
 from blocksim.study.static_limit import NONE, POSSIBLE
 from blocksim.study.sweep import Replay
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 STONE = {"density": 2000.0, "young_modulus": 1e10, "poisson_ratio": 0.2}
 PUSH = "loads.push.magnitude"

@@ -1,23 +1,16 @@
 """Random scenes for the tests of symmetries, and how far two states are apart. SI units, angles in rad."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
+from numpy.typing import NDArray
 
 from blocksim.verification.case import Setting
+from blocksim.verification.scene import Simulation
 from tests.sizes import in_all
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from typing import Any
-
-    from numpy.typing import NDArray
-
-    from blocksim.verification.scene import Simulation
 
 EXPLICIT, RIGID = "explicit", "nonsmooth"
 GRAVITY = 9.81

@@ -1,7 +1,5 @@
 """What does not depend on the point of view: mirror, place, numbers, moving frame, and scale of a random scene."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,23 +1,18 @@
 """Two blocks of any size, placed anyhow: forces do not know which of them comes first, and nothing blows up."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import strategies as st
 
+from blocksim.kernels.common.arrays import World
 from blocksim.verification.case import Setting
+from blocksim.verification.scene import Simulation
 from tests.symmetries.scenes import EXPLICIT, RIGID, RIGID_STEP, for_all, some
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from blocksim.kernels.common.arrays import World
-    from blocksim.verification.scene import Simulation
-
-    Change = Callable[[World], None]
+Change = Callable[[World], None]
 
 FAR_UP = 2.0  # heights of the pair above the ground, at least
 DEEP = 0.002  # overlap of neighbouring edges, as a share of the smaller side

@@ -1,7 +1,5 @@
 """Arches of voussoirs: least thickness and tilt beside limit analysis, and forces at the joints of one on springs."""
 
-from __future__ import annotations
-
 import csv
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """Every case, with springs, rigid contacts and soil; what the README says is still so; what cases compare with."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from math import cos, isnan, radians, sin, sqrt

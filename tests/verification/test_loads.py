@@ -1,9 +1,8 @@
 """Loads and pulses of the support against closed forms and published values, both schemes."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +12,6 @@ from blocksim.simulation import Result, simulate
 from blocksim.study.criterion import Stability
 from blocksim.study.limit import limit
 from tests.simulation.conftest import SCENARIOS
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 WATER, CONCRETE = 9810.0, 2400.0 * 9.81  # N/m3
 HEIGHT = 10.0  # m

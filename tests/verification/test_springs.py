@@ -1,12 +1,10 @@
 """Springs and rigid contacts beyond the cases: phases, rocking, polygons, lists of pairs; what is wrong is noticed."""
 
-from __future__ import annotations
-
 from math import atan2, cos, radians, sin, sqrt, tan
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import REACHED, World
@@ -18,11 +16,7 @@ from blocksim.verification.scene import GOLDEN, HEIGHT, WIDTH, CaseScene, Simula
 from blocksim.world import nonsmooth
 from blocksim.world.build import build_world
 from blocksim.world.interactions import damping_ratio
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from tests.conftest import PaperBlock, Start
+from tests.conftest import PaperBlock, Start
 
 G = 9.81
 PHASES = tuple((GOLDEN * k) % 1.0 for k in range(14))  # of a step; zero begins exactly at one

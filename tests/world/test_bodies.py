@@ -1,11 +1,10 @@
 """Bodies at time zero: pieces of ground and walls and what they do to blocks, particles of boundaries, corners."""
 
-from __future__ import annotations
-
 import itertools
 import math
+from collections.abc import Mapping, Sequence
 from math import atan2, cos, hypot, pi, sin
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,11 +18,7 @@ from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
 from blocksim.world.bodies import cone_of, corner_rows, division
 from blocksim.world.build import SceneStack, build_stacks, build_world, member
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from tests.golden import Golden
+from tests.golden import Golden
 
 SOFT = 1e-3  # of the material's stiffness
 FRICTION = 0.3

@@ -1,8 +1,7 @@
 """From a scenario to arrays, and how its support moves."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import pytest
 
@@ -12,6 +11,7 @@ from blocksim.kernels.common.arrays import (
     Records,
     zeros,
 )
+from blocksim.scenario import Scenario
 from blocksim.verification.scene import scenario_of
 from blocksim.world import memory
 from blocksim.world.build import (
@@ -21,11 +21,6 @@ from blocksim.world.build import (
     with_more_room,
 )
 from blocksim.world.memory import SceneTooLargeError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from blocksim.scenario import Scenario
 
 BODY = {"x": 0.1, "y": 0.2}
 

@@ -1,15 +1,15 @@
 """Contact parameters of material pairs; the closed form of the clipped restitution against integration."""
 
-from __future__ import annotations
-
+from collections.abc import Mapping
 from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from scipy.integrate import solve_ivp
 
-from blocksim.kernels.common.arrays import INTERACTION
+from blocksim.kernels.common.arrays import INTERACTION, Records
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.world.interactions import (
     SMALLEST_RESTITUTION,
@@ -20,14 +20,7 @@ from blocksim.world.interactions import (
     interactions_of,
     restitution_of,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import numpy as np
-
-    from blocksim.kernels.common.arrays import Records
-    from tests.golden import Golden
+from tests.golden import Golden
 
 ALUMINIUM = {"unit_weight": 26.7e3, "young_modulus": 69e9, "poisson_ratio": 0.3}
 OAK = {"density": 700.0, "young_modulus": 11e9, "poisson_ratio": 0.4}

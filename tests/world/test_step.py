@@ -1,9 +1,8 @@
 """Step and skin of a scene: stable by its eigenvalues, under the load that contacts expect, no contact missed."""
 
-from __future__ import annotations
-
+from collections.abc import Mapping
 from math import cos, hypot, inf, pi, sin, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from blocksim.bench.harness import pushed_wall, three_blocks
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common.arrays import AT_REST, REACHED, World
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, tangent_stiffness
-from blocksim.scenario import PlacedBody
+from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.laws import LAWS
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.bodies import layout_of
@@ -32,12 +31,7 @@ from blocksim.world.step import (
     speeds_of,
     stable_step,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from blocksim.scenario import Scenario
-    from tests.golden import Golden
+from tests.golden import Golden
 
 G, HERTZ = 9.81, LAWS["hertz-mindlin"]
 RADIUS = hypot(WIDTH, HEIGHT) / 2

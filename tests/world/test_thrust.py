@@ -1,10 +1,9 @@
 """Joints, thrust and sag at rest choose the step of rigid contacts; what check says of it is what blocks do."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -19,11 +18,7 @@ from blocksim.world.joints import ContactJoint, joints_of
 from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.rigid_step import USUAL_STEP, thrust_shift
 from blocksim.world.sag import loads_at_rest
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from tests.golden import Golden
+from tests.golden import Golden
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 RING = {

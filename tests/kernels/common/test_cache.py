@@ -1,27 +1,21 @@
 """The cache of compiled kernels: never stale, reused, not needed, and no file of it that is damaged is executed."""
 
-from __future__ import annotations
-
 import logging
 import multiprocessing
 import os
 import shutil
 import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from numba.core import funcdesc
 from numba.core.types import abstract, functions
 
 from blocksim.kernels.common import jit
-from blocksim.kernels.common.arrays import PAIR, zeros
+from blocksim.kernels.common.arrays import PAIR, Record, zeros
 from blocksim.kernels.common.compiler import INNER, InnerLibrary, shortcuts
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from blocksim.kernels.common.arrays import Record
 
 PACKAGE = Path(jit.__file__).parents[2]
 

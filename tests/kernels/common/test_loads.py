@@ -1,20 +1,16 @@
 """Loads: what they do to bodies as closed forms say, in both schemes, their work, histories, and threads."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 
+from blocksim.kernels.common.arrays import World
 from blocksim.kernels.common.loads import Pose, force_at, value_at
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation import simulate
 from blocksim.world.build import build_world
-
-if TYPE_CHECKING:
-    from blocksim.kernels.common.arrays import World
 
 G = 9.81
 WIDTH, HEIGHT, DEPTH, DENSITY = 1.0, 0.5, 2.0, 2000.0  # m, m, m, kg/m3

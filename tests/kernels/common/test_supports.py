@@ -1,10 +1,9 @@
 """Motion of bodies: Verlet steps, supports that move and their work, and members that stop once a block has moved."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable, Mapping, Sequence
 from math import cos, sin
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,11 +15,6 @@ from blocksim.kernels.common.members import Watched, frame_to_watch, watch
 from blocksim.kernels.common.supports import acceleration, displacement, tally_moved
 from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
 from blocksim.world.build import build_world
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from blocksim.kernels.common.arrays import Records
 
 
 def finish(bodies: Records) -> None:

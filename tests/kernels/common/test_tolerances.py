@@ -1,15 +1,10 @@
 """Every number that kernels compare with stands in one table, and says who notices where it is wrong."""
 
-from __future__ import annotations
-
 import ast
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from pathlib import Path
 
 from tests.faults.faults import KERNELS, ROOT, TOLERANCES, places_of_tests, tolerances
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 KINDS = {"round-off", "smoothing", "calibrated", "cost"}
 EXACT = {"explicit/laws.py", "sph/functions.py"}  # powers of laws, and factors of kernels

@@ -1,24 +1,18 @@
 """What a check of the run and the ledger find in a world as it is."""
 
-from __future__ import annotations
-
 from math import cos, sin
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import AT_REST, LEDGER, REACHED, zeros
+from blocksim.kernels.common.arrays import AT_REST, LEDGER, REACHED, World, zeros
 from blocksim.kernels.common.mechanics import potential_energy, renew_rotations
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import is_too_deep, pair_forces
 from blocksim.kernels.explicit.step import check, contact_summary, tallied
 from blocksim.verification.scene import HEIGHT
+from tests.conftest import PaperBlock, Start
 from tests.kernels.scenes import pose
-
-if TYPE_CHECKING:
-    from blocksim.kernels.common.arrays import World
-    from tests.conftest import PaperBlock, Start
 
 ON_GROUND = (0.0, 0.5 * HEIGHT - 1e-7, 0.0)
 RESTS = {"stop_at_rest": True, "rest_speed": 1e-3, "rest_hold": 1e-3}

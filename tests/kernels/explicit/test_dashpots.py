@@ -1,15 +1,13 @@
 """Dashpots: the damping ratio of every mode, as defined for any number of points, and when they are made anew."""
 
-from __future__ import annotations
-
 from math import cos, pi, sin
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import example, given, strategies as st
 
-from blocksim.kernels.common.arrays import CONTACT, INTERACTION, NORMAL, OPERATOR, PAIR, POINT, SHEAR, zeros
+from blocksim.kernels.common.arrays import CONTACT, INTERACTION, NORMAL, OPERATOR, PAIR, POINT, SHEAR, World, zeros
 from blocksim.kernels.common.tolerances import DASHPOT_RANK, OPERATOR_LIFE
 from blocksim.kernels.explicit.contact import shared_step
 from blocksim.kernels.explicit.damping import (
@@ -25,12 +23,9 @@ from blocksim.kernels.explicit.forces import Touch, grip_of, keep, renew_operato
 from blocksim.kernels.explicit.kinematics import Point, point_of, resolve_point, weigh_first_step
 from blocksim.kernels.explicit.laws import LINEAR, spring_at
 from blocksim.verification.scene import HEIGHT, WIDTH
+from tests.conftest import PaperBlock, Start
 from tests.kernels.references import dashpots_by_definition, delassus, rates_of_points
 from tests.kernels.scenes import make_body, pose
-
-if TYPE_CHECKING:
-    from blocksim.kernels.common.arrays import World
-    from tests.conftest import PaperBlock, Start
 
 STEP = 2e-7
 K = 1e9

@@ -1,15 +1,12 @@
 """Laws, friction, and what contacts remember: shear springs, and what becomes of them as contacts end."""
 
-from __future__ import annotations
-
 from math import atan2, exp, hypot
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import ACTION, INTERACTION, zeros
+from blocksim.kernels.common.arrays import ACTION, INTERACTION, Record, World, zeros
 from blocksim.kernels.common.mechanics import friction_coefficient
 from blocksim.kernels.explicit.history import change_contacts
 from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point
@@ -25,11 +22,8 @@ from blocksim.kernels.explicit.laws import (
 from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, side_normal
 from blocksim.scenario.laws import LAWS, Law
 from blocksim.verification.scene import HEIGHT, WIDTH
+from tests.conftest import PaperBlock, Start
 from tests.kernels.scenes import pose
-
-if TYPE_CHECKING:
-    from blocksim.kernels.common.arrays import Record, World
-    from tests.conftest import PaperBlock, Start
 
 K = 9.5e8
 

@@ -1,15 +1,14 @@
 """Contacts that continue: the same forces as in contact.py, and what is quicker than a search says the same."""
 
-from __future__ import annotations
-
 import copy
+from collections.abc import Mapping, Sequence
 from math import cos, pi, sin
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import NORMAL, SHEAR
+from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, World
 from blocksim.kernels.common.jit import config
 from blocksim.kernels.common.mechanics import kick_and_drift
 from blocksim.kernels.explicit.contact import pair_forces
@@ -25,13 +24,8 @@ from blocksim.kernels.explicit.persistent_forces import (
 from blocksim.kernels.explicit.sides import MOST_CORNERS, into_world, next_number, number_before
 from blocksim.kernels.explicit.sliver_axes import is_sliver, meets_along
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation
+from tests.conftest import Start
 from tests.kernels.scenes import pose
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from blocksim.kernels.common.arrays import Record, World
-    from tests.conftest import Start
 
 STEP = 1e-6
 ROUND_OFF = 64 * np.finfo(float).eps  # of places, which are some ten sums and products

@@ -1,14 +1,25 @@
 """Points between bodies: which corners and discs touch which faces, how deep, and what share of a face they bear."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
+from numpy.typing import NDArray
 
-from blocksim.kernels.common.arrays import CONTACT, CONTACTS, NORMAL, PAIR, POINT, SHEAR, SLOTS, SUPPORT, zeros
+from blocksim.kernels.common.arrays import (
+    CONTACT,
+    CONTACTS,
+    NORMAL,
+    PAIR,
+    POINT,
+    SHEAR,
+    SLOTS,
+    SUPPORT,
+    Record,
+    World,
+    zeros,
+)
 from blocksim.kernels.common.shapes import separation, to_world
 from blocksim.kernels.common.tolerances import CONE_TOLERANCE, FLAT, SHARE_PERIOD
 from blocksim.kernels.explicit.bearing import bearing_along
@@ -19,15 +30,9 @@ from blocksim.kernels.explicit.models.surface import block_points, find_points
 from blocksim.kernels.explicit.sides import MOST_CORNERS, side_normal
 from blocksim.kernels.sph.functions import kernel_value
 from blocksim.verification.scene import HEIGHT, WIDTH
+from tests.conftest import Start
 from tests.kernels.references import corners, in_frame
-from tests.kernels.scenes import make_body, pose, touch
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from blocksim.kernels.common.arrays import Record, World
-    from tests.conftest import Start
-    from tests.kernels.scenes import Touching
+from tests.kernels.scenes import Touching, make_body, pose, touch
 
 OF_B = MOST_CORNERS  # slots from there on
 ALL = np.array([*range(4), *range(OF_B, OF_B + 4)])

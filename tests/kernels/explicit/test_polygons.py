@@ -1,13 +1,13 @@
 """Polygons on springs: slivers, corners that pass one another, ends of faces; energy is a function of their state."""
 
-from __future__ import annotations
-
 from math import atan2, cos, hypot, pi, sin
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from blocksim.kernels.common.arrays import World
 from blocksim.kernels.common.tolerances import FLAT, HAND_OVER
 from blocksim.kernels.explicit import slivers
 from blocksim.kernels.explicit.bearing import flat_within
@@ -16,14 +16,7 @@ from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.models.surface import near_slots
 from blocksim.kernels.explicit.sides import MOST_CORNERS, cone_of
 from blocksim.kernels.explicit.sliver_axes import Axis, nearest_axis
-from blocksim.verification.scene import CaseScene
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from blocksim.kernels.common.arrays import World
-    from blocksim.verification.scene import Simulation
-
+from blocksim.verification.scene import CaseScene, Simulation
 
 Outline = list[list[float]]
 RADIUS = 0.02  # m

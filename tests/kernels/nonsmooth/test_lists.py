@@ -1,25 +1,19 @@
 """The list of pairs of rigid contacts, its colours, and packs of four, which find their numbers by place."""
 
-from __future__ import annotations
-
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, TOUCHING
+from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, TOUCHING, Nonsmooth
 from blocksim.kernels.nonsmooth.neighbours import frame_of_supports, most_packs, rebuild, update_pairs
 from blocksim.kernels.nonsmooth.packs import gather
 from blocksim.kernels.nonsmooth.step import substep
 from tests.kernels.references import apart, corners
 from tests.kernels.scenes import Block, collided, listed, listed_constraints, pairs_of, place, posed, velocities
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 
 STEP = 1e-3  # s
 BLOCKS = 24

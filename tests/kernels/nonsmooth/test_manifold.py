@@ -1,19 +1,20 @@
 """Contact manifolds: against polygons clipped another way, the impulses they keep, and how gaps bend."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from numpy.typing import NDArray
 
-from blocksim.kernels.common.arrays import zeros
-from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, STEPPING, TOUCHING
+from blocksim.kernels.common.arrays import Record, zeros
+from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, STEPPING, TOUCHING, Nonsmooth
 from blocksim.kernels.nonsmooth.faces import Edge, Face, clip
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.slip import Constraints, Motion, bend_of, bend_time, follow_curvature, slip_of
+from blocksim.scenario.geometry import Corners
 from blocksim.verification.scene import HEIGHT, WIDTH
 from tests.kernels import references
 from tests.kernels.references import corners, meet, places_of, sides, turning
@@ -30,15 +31,6 @@ from tests.kernels.scenes import (
     rectangle,
     turned,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from blocksim.kernels.common.arrays import Record
-    from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-    from blocksim.scenario.geometry import Corners
 
 PAIRS = 25
 BRICK = rectangle(WIDTH, HEIGHT)

@@ -1,7 +1,5 @@
 """Rigid blocks in motion: closed forms, energy, cuts of steps, supports, edges, impacts and groups that touch."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any

@@ -1,26 +1,20 @@
 """What a substep solves: complementarity, Coulomb's cone, momentum, restitution; kicks and drifts of single bodies."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.random import Generator
+from numpy.typing import NDArray
 
 from blocksim.kernels.common.tolerances import LATE
-from blocksim.kernels.nonsmooth.arrays import FAR, TALLY_PACKS
+from blocksim.kernels.nonsmooth.arrays import FAR, TALLY_PACKS, Nonsmooth
 from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, VELOCITY, range_of_thread, sweep, velocity_pass
 from blocksim.kernels.nonsmooth.step import bodies_of_thread, substep
 from blocksim.world.sag import soft_contact
 from tests.kernels.references import Dense, dense
 from tests.kernels.scenes import Block, after_substep, collided, pile, posed, single, velocities
-
-if TYPE_CHECKING:
-    from numpy.random import Generator
-    from numpy.typing import NDArray
-
-    from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 
 G = 9.81
 H = 1e-3  # s, a substep

@@ -1,28 +1,23 @@
 """Smoothing functions, sums over particles, what they keep exactly, and the face for users."""
 
-from __future__ import annotations
-
 import doctest
 import math
 import re
 import runpy
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from scipy.integrate import quad
 
+from blocksim.kernels.common.arrays import Floats
 from blocksim.kernels.sph import fields
 from blocksim.kernels.sph.fields import KernelName, Particles, find_neighbours, gradient, interpolate
 from blocksim.kernels.sph.functions import KERNEL_CODES, kernel_slope, kernel_value, support_radius
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from blocksim.kernels.common.arrays import Floats
-    from tests.golden import Golden
+from tests.golden import Golden
 
 H = 0.013
 EVERY_CODE = pytest.mark.parametrize("code", KERNEL_CODES.values(), ids=KERNEL_CODES.keys())
