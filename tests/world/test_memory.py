@@ -110,6 +110,17 @@ def test_the_step_that_is_reported_is_the_one_that_is_taken() -> None:
     assert told.steps * told.step == pytest.approx(scenario.time.end, abs=told.step)
 
 
+def test_walls_of_their_own_material_are_pairs_too() -> None:
+    walls = [{"from": [1, 0], "to": [1, 1], "material": "oak"}, {"from": [2, 0], "to": [2, 1]}]
+    oak = {"density": 700, "young_modulus": 11e9, "poisson_ratio": 0.3}
+    values = {"materials.oak": oak, "walls": walls, "pairs.aluminium.oak.friction": 0.6}
+    scenario = load_scenario(SCENARIOS / "slide.toml", values)
+    pairs = {pair.pair: pair for pair in describe(scenario).pairs}
+    assert list(pairs) == ["aluminium - ground", "aluminium - aluminium", "aluminium - wall of oak"]
+    assert [pair.static_friction for pair in pairs.values()] == [0.38, 0.31, 0.6]
+    assert pairs["aluminium - wall of oak"].rules["friction"] == "pairs.aluminium.oak.friction"
+
+
 def test_frames_that_go_into_a_folder_take_no_memory() -> None:
     shipped = SCENARIOS / "tower.toml"
     coarse, fine = (describe(load_scenario(shipped, [f"output.every={every}"])) for every in (0.01, 1e-5))

@@ -17,6 +17,7 @@ from blocksim.world.interactions import contact_classes
 from blocksim.world.systems.soil_arrays import interactions_with
 from blocksim.world.systems.soils import (
     SOILS,
+    body_contacts,
     connected_span,
     earth_pressure_at_rest,
     final_table,
@@ -26,7 +27,7 @@ from blocksim.world.systems.soils import (
     yield_surface,
 )
 from blocksim.world.systems.system import SystemInScene, Track
-from tests.soils import DEPTH, LEFT, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, column, right, scene
+from tests.soils import DEPTH, LEFT, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, Soil, column, right, scene
 
 ANGLE = math.radians(21.9)
 COLUMN = column(0.05, 0.1, 0.005)
@@ -150,6 +151,23 @@ def still(**changed: NDArray[np.float64]) -> Track:
     for name, new in changed.items():
         track[name][1] = new
     return track
+
+
+def test_contacts_with_bodies_add_up_to_the_forces_on_them() -> None:
+    soil = Soil(SCENE)
+    soil.to_time(0.02)
+    found = body_contacts(soil.soils, soil.world)
+    ground = soil.world.bodies.size - 1
+    for body in (1, ground):
+        own = found.body == body
+        nx, ny = found.normal[own].T
+        push, rub = found.normal_force[own], found.shear_force[own]
+        force = [(push * nx - rub * ny).sum(), (push * ny + rub * nx).sum()]
+        assert force == pytest.approx(soil.force_on(body), rel=1e-9)
+        assert abs(soil.force_on(body)).max() > 0.3
+    assert found.place[found.body == 1, 0] == pytest.approx(0.0, abs=1e-12)  # on the face of the wall
+    assert found.place[found.body == ground, 1] == pytest.approx(0.0, abs=1e-12)
+    assert set(found.part.tolist()) == {0}
 
 
 def test_the_front_ends_at_the_first_gap_and_the_last_particle_is_told_beside_it() -> None:
