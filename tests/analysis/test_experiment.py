@@ -1,12 +1,13 @@
-"""Measured tables and tables of properties: the numbers that the paper prints, and what is said of broken ones."""
+"""Measured tables, curves and tables of properties: numbers that are printed, and what is said of broken ones."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from blocksim.analysis.curves import load_curves
-from blocksim.analysis.experiment import load_properties, load_table
+from blocksim.analysis.compare import Verdict
+from blocksim.analysis.curves import Envelope, compare_curves, load_curves
+from blocksim.analysis.experiment import has_curves, load_properties, load_table
 from blocksim.errors import InvalidInputError
 from tests.golden import Golden, read
 
@@ -77,3 +78,77 @@ def test_broken_tables_are_explained_where_they_are_broken(
         with pytest.raises(InvalidInputError) as caught:
             load(Path("table.csv"))
         golden(str(caught.value), name)
+
+
+RISE = "jack,1,0,0\njack,1,1,10\njack,1,2,10\njack,1,4,6\njack,2,0,0\njack,2,1,12\njack,2,2,11\njack,2,4,8\n"
+HEAD = "probe,replicate,displacement_mm,force_kN\n"
+
+
+def table(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "curves.csv"
+    path.write_text(text)
+    return path
+
+
+def record(*points: tuple[float, float]) -> dict[str, np.ndarray]:
+    """Return a record in SI from points in mm and kN."""
+    x, y = np.array(points, float).T
+    return {"time": np.arange(len(x), dtype=float), "displacement": 1e-3 * x, "force": 1e3 * y}
+
+
+def test_numbers_of_a_curve_that_rises_and_falls() -> None:
+    curve = Envelope.of(np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.0, 10.0, 10.0, 6.0]), 1.0)
+    assert (curve.peak, curve.place_of_peak, curve.place_of_fall) == (10.0, 1.0, 4.0)
+    assert curve.stiffness == pytest.approx(10.0)
+    assert curve.area(3.0) == pytest.approx(5.0 + 10.0 + 9.0)
+
+
+def test_the_envelope_of_cycles_are_the_points_reached_first_in_each_direction() -> None:
+    x = np.array([0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 2.0, 0.0, -2.0, 0.0])
+    y = np.array([0.0, 5.0, 1.0, -4.0, 0.0, 3.0, 6.0, 0.0, -7.0, 0.0])
+    there, back = Envelope.of(x, y, 1.0), Envelope.of(x, y, -1.0)
+    assert (there.x.tolist(), there.y.tolist()) == ([0.0, 1.0, 2.0], [0.0, 5.0, 6.0])
+    assert (back.x.tolist(), back.y.tolist()) == ([0.0, 1.0, 2.0], [-0.0, 4.0, 7.0])
+
+
+def test_a_curve_is_judged_by_the_range_of_the_repeats(tmp_path: Path) -> None:
+    measured = load_curves(table(tmp_path, HEAD + RISE))
+    inside = compare_curves({"jack": record((0, 0), (1, 11), (2, 10.5), (4, 7))}, measured)
+    assert {row.quantity: row.verdict for row in inside.rows} == dict.fromkeys(
+        ("peak", "at peak", "area", "stiffness"), Verdict.INSIDE
+    )
+    weak = compare_curves({"jack": record((0, 0), (1, 8), (2, 9), (4, 7))}, measured)
+    peak, *_ = weak.rows
+    assert (peak.simulated, peak.minimum, peak.maximum, peak.verdict) == (9.0, 10.0, 12.0, Verdict.OUTSIDE)
+    assert peak.distance == pytest.approx(1.0)
+    wide = compare_curves({"jack": record((0, 0), (1, 8), (2, 9), (4, 7))}, measured, 0.1)
+    assert wide.rows[0].verdict is Verdict.INSIDE
+    assert "of the peak from the mean curve" in weak.messages[0]
+
+
+def test_both_directions_are_judged_where_both_were_measured_and_simulated(tmp_path: Path) -> None:
+    mirrored = "".join(f"jack,3,-{i},-{i}\n" for i in (1, 2, 3))
+    measured = load_curves(table(tmp_path, HEAD + RISE + mirrored))
+    found = compare_curves({"jack": record((0, 0), (1, 11), (0, 0), (-1, -1), (-3, -3))}, measured)
+    assert [row.quantity for row in found.rows if row.quantity.startswith("peak")] == ["peak", "peak back"]
+    (back,) = [row for row in found.rows if row.quantity == "peak back"]
+    assert (back.simulated, back.n, back.verdict) == (3.0, 1, Verdict.INSIDE)
+
+
+def test_probes_and_columns_that_a_run_lacks_are_named(tmp_path: Path) -> None:
+    measured = load_curves(table(tmp_path, HEAD + RISE))
+    with pytest.raises(InvalidInputError, match="unknown probe 'jack', did you mean 'jakc'"):
+        compare_curves({"jakc": record((0, 0), (1, 1))}, measured)
+    with pytest.raises(InvalidInputError, match="records no force"):
+        compare_curves({"jack": {"displacement": np.zeros(2)}}, measured)
+    with pytest.raises(InvalidInputError, match="goes nowhere where it was measured"):
+        compare_curves({"jack": record((0, 0), (-1, -1))}, measured)
+
+
+def test_a_table_is_one_of_curves_or_of_final_positions(tmp_path: Path) -> None:
+    path = table(tmp_path, HEAD + RISE)
+    assert has_curves(path)
+    with pytest.raises(InvalidInputError, match=r"a table of final positions .* is needed"):
+        load_table(path)
+    path.write_text("block,quantity,unit,replicate,value\n1,x,mm,1,2\n")
+    assert not has_curves(path)

@@ -16,7 +16,7 @@ from tests.faults.faults import HERE, ROOT, Fault, Finding, Verdict, faults_in, 
 from tests.faults.mutants import sample
 
 FAULTS = [*faults_in(HERE), *faults_of_tolerances()]
-EXAMPLE = Fault("a name", "blocksim/errors.py", "USAGE = 2", "USAGE = 3", ("tests/test_locked.py",))
+EXAMPLE = Fault("a name", "blocksim/errors.py", "USAGE = 2", "USAGE = 3", ("tests/test_code_from_data.py",))
 
 
 def test_every_fault_can_still_be_put_in() -> None:
