@@ -10,6 +10,7 @@ from hypothesis import assume, given, strategies as st
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import (
+    MOTION_PIECE,
     NEAR_PAIR,
     PAIR,
     Floats,
@@ -26,7 +27,7 @@ from blocksim.kernels.explicit.broad_phase import PAIR_SHARE, carry_history, uns
 from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.explicit.persistent_forces import CHANGED, UNTOUCHED, persistent_forces
 from blocksim.kernels.sph.fields import PLACE, find_neighbours
-from blocksim.verification.scene import scenario_of
+from blocksim.verification.scene import Simulation, scenario_of
 from blocksim.world.build import build_world, empty_lists
 from tests.kernels.references import apart as largest_gap, distances, turning
 from tests.kernels.scenes import make_body, pose
@@ -304,6 +305,27 @@ def test_no_falling_body_comes_beyond_its_share_unseen(world: World, share: floa
     time = steps * float(world.controls[0].step)
     assert 0 <= steps <= MOST_UNSEEN
     assert share * reach + fastest * time + 0.5 * G * time**2 <= reach
+
+
+def jolt() -> World:
+    """Jerk the ground away below three blocks at rest: the support's speed jumps from none to 2 m/s."""
+    bodies = [{"x": 0.04 * i, "y": 0.0125} for i in range(2)] + [{"x": 0.02, "y": 0.0376}]
+    pieces = zeros(2, MOTION_PIECE)
+    pieces[1].start, pieces[1].c1 = 2e-3, 2.0
+    contact = {**SOFT, "max_overlap": 0.02}
+    world = build_world(scenario_of(bodies, contact=contact, time={"stop_at_rest": False}))
+    world.controls.motion_x = 1.0
+    return world._replace(motion=pieces)
+
+
+def test_no_body_comes_beyond_its_share_before_pairs_are_looked_for(pace: int) -> None:
+    scene = Simulation(jolt())
+    stops, share = round(0.02 / scene.step) // pace, PAIR_SHARE * float(scene.world.controls[0].skin)
+    for step in range(1, stops):
+        bodies = scene.to_step(step).world.bodies
+        moved = np.hypot(bodies.x - bodies.list_x, bodies.y - bodies.list_y)
+        assert (moved + bodies.radius * np.abs(bodies.angle - bodies.list_angle)).max() <= share, step
+    assert 1 <= scene.world.clock[0].rebuilds < stops / 3
 
 
 STEP = 1e-6

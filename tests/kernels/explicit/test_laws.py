@@ -1,6 +1,6 @@
 """Laws, friction, and what contacts remember: shear springs, and what becomes of them as contacts end."""
 
-from math import atan2, exp, hypot
+from math import exp
 
 import numpy as np
 import pytest
@@ -20,8 +20,7 @@ from blocksim.kernels.explicit.laws import (
     tangent_stiffness,
 )
 from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, side_normal
-from blocksim.scenario.laws import LAWS, Law
-from blocksim.verification.scene import HEIGHT, WIDTH
+from blocksim.scenario.laws import LAWS
 from tests.conftest import PaperBlock, Start
 from tests.kernels.scenes import pose
 
@@ -51,27 +50,35 @@ def test_restitution_is_the_one_asked_at_any_speed(start: Start, paper_block: Pa
         assert scene.residual() < 1e-3
 
 
-X, Y = 0.5 * WIDTH, 0.5 * HEIGHT
-OUTLINE = {"outline": [[-X, -Y], [X, -Y], [X, Y], [-X, Y]]}
+DEEPEST = 1e-5  # m
 
 
-@pytest.mark.parametrize(("angle", "e"), [(0.0, 0.31), (atan2(WIDTH, HEIGHT), 0.89)])  # flat, and a central impact
-@pytest.mark.parametrize("shape", [{}, OUTLINE], ids=["rectangle", "polygon"])
-def test_law_is_its_power_alone(
-    start: Start, monkeypatch: pytest.MonkeyPatch, shape: dict[str, object], angle: float, e: float
+@pytest.mark.parametrize("law", [1.0, 1.5])
+@given(
+    path=st.lists(st.tuples(st.floats(1e-3, 1.0), st.floats(-2.0, 2.0)), min_size=1, max_size=15),
+    friction=st.floats(0.01, 2.0),
+)
+def test_shear_spring_never_gives_back_more_than_was_put_in(
+    law: float, path: list[tuple[float, float]], friction: float
 ) -> None:
-    """A third one, in the place of Hertz's, rebounds as asked and keeps its energy; no other test has these e."""
-    third = Law("hertz-mindlin", 1.25, lambda depth, radius: depth**0.5 * radius**0.25)
-    monkeypatch.setitem(LAWS, "hertz-mindlin", third)
-    stiff, soft = (third.greatest_slope(1e9, 2.0, speed, 0.0) for speed in (4.0, 1.0))
-    assert stiff / soft == pytest.approx(4.0 ** (2.0 * 0.25 / 2.25))  # of d^0.25, d going with v^(2/2.25)
-    falling = {"y": (hypot(X, Y) if angle else Y) + 1e-9, "angle": angle, "velocity": [0.0, -1.0], **shape}
-    scene = start([falling], restitution=e, gravity=0.0, contact=SOFT_HERTZ)
-    while scene.contacts or scene.bodies[0].vy < 0.0:
-        scene.to_step(scene.steps + 1)
-    assert scene.world.controls[0].exponent == 1.25
-    assert scene.bodies[0].vy == pytest.approx(e, abs=0.01)
-    assert scene.residual() < 1e-3
+    """Of one point that is led to overlaps (of the deepest one) and slips (of the longest spring there)."""
+    values = zeros(1, INTERACTION)[0]
+    values.static_friction, values.kinetic_friction, values.transition_speed = friction, friction, 1e-3
+    scale = friction * elastic_force(law, STIFFNESS, DEEPEST) * DEEPEST
+    spring = before = force = work = stored = 0.0
+    for share, slips in path:
+        normal = elastic_force(law, STIFFNESS, share * DEEPEST)
+        stiffness = 0.8 * tangent_stiffness(law, STIFFNESS, share * DEEPEST)
+        for slip in (0.0, slips * friction * normal / stiffness):
+            pulled, held = force, stored
+            spring, limit, _, lost = draw_spring(values, stiffness, before, spring, slip, 1.0, normal, 0.0)
+            force = clip_to_cone(values, stiffness * spring, limit, normal, 0.0)
+            before, stored, done = stiffness, 0.5 * stiffness * spring**2, 0.5 * (pulled + force) * slip
+            work += done
+            assert lost == pytest.approx(done - (stored - held), abs=1e-16)
+            assert lost >= -1e-15 * scale
+            assert work >= stored - 1e-14 * scale
+            assert abs(force) <= friction * normal * (1.0 + 1e-12)
 
 
 REMEMBERED = ("spring", "depth", "normal_force", "shear_force")
