@@ -61,7 +61,7 @@ run: $(RUN_STAMP) ## Let the three blocks collapse and compare with the measurem
 	$(BLOCKSIM) compare $(SCENARIO)
 
 .PHONY: test
-test: $(DEV_STAMP) ## Run the tests (sets up .venv first); four minutes on two cores, once kernels are compiled
+test: $(DEV_STAMP) ## Run the tests (sets up .venv first); two to five minutes on two cores, once kernels are compiled
 	@$(COMPILE)
 	$(VENV_PYTHON) -m pytest $(ON_ALL_CORES)
 
