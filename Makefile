@@ -121,6 +121,10 @@ smoke: $(RUN_STAMP) ## Short run, 2 x 2 sweep and compare, for your CI: does thi
 	if [ $$code -gt 1 ]; then echo "smoke: compare failed with exit code $$code" >&2; exit $$code; fi; \
 	echo "smoke: ok in $$SECONDS s (nothing has landed after 0.05 s, so \"outside\" is right here)"
 
+.PHONY: figures
+figures: $(DEV_STAMP) ## Measure the plan of the package: lines, imports, repetitions; beside a reference and limits
+	$(VENV_PYTHON) -m tests.plan.figures
+
 .PHONY: lint
 lint: $(DEV_STAMP) ## Check style, types and the direction of imports
 	$(VENV_PYTHON) -m ruff check
