@@ -1,4 +1,4 @@
-"""No figure of the plan of the package has grown by more than its allowance, and private parts of numba and llvmlite are taken in one module."""
+"""No figure of the plan of the package exceeds its limit, and private parts of numba are taken in one module."""
 
 import ast
 from collections.abc import Iterator

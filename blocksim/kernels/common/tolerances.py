@@ -167,11 +167,12 @@ FAR = 1e9  # round-off | metre, metre per second
 # By so much a face of body a has to be better than one of body b.
 # x10 and /10: test_face_of_body_a_has_to_be_better_by_a_tie
 TIE = 6.25e-6  # round-off | least half side of the pair
-# Two faces that face each other over less are passed by. x10 and /10: test_side_that_is_met_over_a_sliver_is_passed_by
-EDGE = 0.01  # calibrated | smaller inner radius
-# Angle between faces up to which that is so.
-# Nothing notices: faces of rectangles that meet over less than EDGE are within 0.005 of level anyway.
-LEVEL = 0.1  # calibrated | sine of an angle
+# Corners nearer to one another meet, and a third body may show which faces do. Overlaps of a run are less.
+NEAR_CORNER = 0.1  # cost | smaller inner radius
+# Overlaps no deeper than that do not show which faces of two corners meet: times the deepest of what presses them,
+SAG = 2.0  # calibrated | deepest overlap
+# and beside that, as neighbours sink unequally. A step of that height is climbed.
+UNEVEN = 2e-3  # calibrated | smaller inner radius
 # Two points with less between them are one. x10 and /10: test_two_points_with_next_to_nothing_between_them_are_one
 ONE_POINT = 1e-5  # round-off | smaller half perimeter of the boxes
 # Impulses are kept while the normal turns by no more than 25 degrees.

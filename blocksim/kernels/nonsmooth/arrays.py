@@ -30,8 +30,8 @@ CONSTRAINT = record_type(
     "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
     "bend shear_bend",  # m/s: gain of the velocities at the points in half a substep, as bodies turn; slip.py
     indices="a b material",  # bodies; place in the table of interactions
-    # of the manifold in the current step: AWAY, OPEN or TOUCHING; its impulses are those of impacts that are over:
-    # NOT_STRUCK, STRUCK, STRUCK_AT_REST; FORGOTTEN of the last one when the next step has begun without them
+    # of the manifold in the current step: AWAY, OPEN, TOUCHING, UNDECIDED; its impulses are those of impacts that are
+    # over: NOT_STRUCK, STRUCK, STRUCK_AT_REST; FORGOTTEN of the last one when the next step has begun without them
     flags="reach is_struck "
     "corner_one corner_two",  # of a polygon's pair: the corners that the points are, see narrow_phase.py; else zero
 )
@@ -96,7 +96,8 @@ IMPACT_LANES = on_own_lines(
 )
 KEPT = record_type(
     "nx ny normal_one normal_two shear",  # of a constraint whose pair is in the next list too
-    indices="a b colour next",  # bodies of a listed pair, its colour; the next old one with the same body a, from 1
+    # bodies of a listed pair, its colour; the next old one with the same body a, from 1; likewise in flush_joints.py
+    indices="a b colour next next_of_b",
     flags="corner_one corner_two is_struck",
 )
 STEPPING = record_type(
@@ -143,7 +144,8 @@ PUSH = record_type(
 TALLY = record_type("impacts friction to_support")  # J: what normal and shear impulses have taken, and given, so far
 
 FAR = tolerances.FAR  # m or m/s: of points that are not there, or do not count
-AWAY, OPEN, TOUCHING = range(3)  # no point within the margin; a gap at all points; a point that touches or pressed
+# no point within the margin; a gap at all points; a point that touches or pressed; not known yet: flush_joints.py
+AWAY, OPEN, TOUCHING, UNDECIDED = range(4)
 NEITHER, LOW, HIGH = range(3)  # sides of the last solution of a group: too little energy, or too much; impacts.py
 NOT_STRUCK, STRUCK, STRUCK_AT_REST, FORGOTTEN = range(4)  # the last two pressed before the impact too
 COLOURS = 64  # the last one is for pairs that found no other; one thread goes through it
@@ -162,7 +164,8 @@ class Contacts(NamedTuple):
     tallies: Records  # (p / TALLY_PACKS + 1,) TALLY
     impacts: Any  # (n + 1,) IMPACT; None where impacts do not follow from one another
     impact_lanes: Any  # (g,) IMPACT_LANES; likewise
-    residuals: Floats  # (2, 8 t) m/s: the largest change of velocity that each thread found in a sweep, twice
+    # (2, 8 t) m/s: the largest change of velocity that each thread found in a sweep, twice; before, how many UNDECIDED
+    residuals: Floats
     stepping: Records  # (1,) STEPPING
 
 
@@ -171,7 +174,7 @@ class Nonsmooth(NamedTuple):
 
     world: World
     contacts: Contacts
-    kept: Records  # (p,) KEPT, work space of a new pair list
+    kept: Records  # (p,) KEPT, work space of a new pair list and of flush joints
     reaches: Floats  # (n + 1,) m: how far beyond each body its neighbours were sought; of the ground zero
     firsts: Integers  # (n + 1,) work space: the first old constraint of a body a, from 1; 0 where there is none
     begins: Integers  # (COLOURS + 1,) where every colour begins among the constraints

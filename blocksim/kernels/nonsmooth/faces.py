@@ -131,6 +131,20 @@ def least_half(a: Block, b: Block) -> Lanes:
 
 
 @jit.kernel
+def least_inner(a: Block, hulls_a: AnyHulls, b: Block, hulls_b: AnyHulls) -> Lanes:
+    """Return the smaller inner radius (m) of two bodies."""
+    if hulls_a is None:
+        return least_half(a, b)
+    return lesser(hulls_a.inner, hulls_b.inner)
+
+
+@jit.kernel
+def face_count(hulls: AnyHulls) -> int:
+    """Return the number of faces of a single body."""
+    return RECTANGLE if hulls is None else hulls.size
+
+
+@jit.kernel
 def normal_at(hulls: Hulls, k: int, lane: Lane) -> tuple[Lanes, Lanes, Lanes, Lanes]:
     """Return normal, distance and middle (m) of face k of bodies."""
     one, two, three, last = hulls.places

@@ -4,9 +4,8 @@ Both ends lie on the reference face (references.py), to which the face of the ot
 clipped: that gives at most two points. Each of them is a corner of one of the bodies, and impulses of polygons go with
 these corners from step to step.
 
-Polygons whose faces hardly face one another, or meet beside the reference face, are looked at one pair at a time: they
-meet at the next best face, if it is nearly parallel to one of the other body, and a face of b on which no point lies
-gives way to that of a.
+Pairs whose corners meet are looked at one at a time, as other faces may be right (flush_joints.py), and polygons too
+that meet beside the reference face: a face of b on which no point lies gives way to that of a.
 
 A segment of ground is a line with the solid below, of which only the upper face counts. Of its face and those of the
 block, the one beyond which the other reaches least shows how the two meet, and all of the block count, whichever way
@@ -20,7 +19,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.simd import Lanes, Mask, is_all, lesser, select
-from blocksim.kernels.common.tolerances import EDGE, FACING, ONE_POINT, PARALLEL_COSINE, TIE
+from blocksim.kernels.common.tolerances import FACING, NEAR_CORNER, ONE_POINT, PARALLEL_COSINE, TIE
 from blocksim.kernels.nonsmooth import arrays, faces, references, slip
 
 UPPER_RIGHT, UPPER_LEFT, SHARP_RIGHT, SHARP_LEFT = 2, 3, 4, 5  # bits of corners of a segment
@@ -48,6 +47,7 @@ class Manifold(NamedTuple):
     best: references.Best
     is_left: Mask
     is_right: Mask
+    are_corners: Mask  # all points are near a corner of both bodies
 
 
 @jit.kernel
@@ -89,47 +89,46 @@ def points_of(
 
 
 @jit.kernel
-def manifold_on(reference: references.Reference, a: faces.Block, b: faces.Block, margin: float) -> Manifold:
-    """Return the manifolds on reference faces."""
+def meet_with_corners(whole: faces.Edge, edge: faces.Edge, face: faces.Face, margin: float, near: Lanes) -> Mask:
+    """Return True where all points within the margin (m) of a face are near corners of both bodies: within `near` (m).
+
+    Given are the other face, whole and clipped.
+    """
+    is_left, is_right = edge.left_gap <= margin, edge.right_gap <= margin
+    at_left = (abs(whole.left - face.left) < near) & is_left & (edge.right_gap > margin)
+    at_right = (abs(whole.right - face.right) < near) & is_right & (edge.left_gap > margin)
+    return (edge.right - edge.left < near) | at_left | at_right
+
+
+@jit.kernel
+def manifold_on(
+    reference: references.Reference, a: faces.Block, b: faces.Block, margin: float, inner: Lanes
+) -> Manifold:
+    """Return the manifolds on reference faces; `inner` (m) is the smaller inner radius."""
     is_of_b, best = reference.is_of_b, reference.best
     face = faces.face_on(faces.either(is_of_b, b, a), reference.side)
     whole = faces.edge_on(face, faces.either(is_of_b, a, b), reference.facing)
     edge = faces.clip(whole, face)
     points, has_point = points_of(face, edge, a, b, is_of_b, margin)
     is_near = (best.gap <= margin) & (edge.right > edge.left) & has_point
-    return Manifold(points, is_near, is_of_b, best, whole.left >= face.left, whole.right <= face.right)
+    are_corners = meet_with_corners(whole, edge, face, margin, NEAR_CORNER * inner)
+    return Manifold(points, is_near, is_of_b, best, whole.left >= face.left, whole.right <= face.right, are_corners)
 
 
 @jit.kernel
-def is_any_odd(found: Manifold, hulls_a: faces.AnyHulls, hulls_b: faces.AnyHulls, margin: float) -> bool:
-    """Return True if faces of any pair of polygons hardly face one another or have no point."""
-    if hulls_a is None:
-        return False
+def is_without_point(found: Manifold, margin: float) -> Mask:
+    """Return True where no point lies on the best face, one of body b."""
     points = found.points
-    is_sliver = points.constraint.width < EDGE * lesser(hulls_a.inner, hulls_b.inner)
-    is_empty = found.is_of_b & (lesser(points.gap_one, points.gap_two) >= arrays.FAR)
-    return not is_all(select((found.best.gap <= margin) & (is_sliver | is_empty), 1.0, 0.0) <= 0.0)
+    return (found.best.gap <= margin) & found.is_of_b & (lesser(points.gap_one, points.gap_two) >= arrays.FAR)
 
 
-@jit.rare_kernel
-def manifold_beside(
-    is_of_b: bool,
-    best: references.Best,
-    a: faces.Block,
-    hulls_a: faces.Hulls,
-    b: faces.Block,
-    hulls_b: faces.Hulls,
-    margin: float,
-) -> Manifold:
-    """Return the manifold on the best face of a body, or on the next best where it faces the other over a sliver."""
-    found = manifold_on(references.reference_on(is_of_b, best, best, hulls_a, hulls_b, 0), a, b, margin)
-    least = EDGE * min(hulls_a.inner, hulls_b.inner)
-    if found.points.constraint.width < least:
-        body, hulls, other, others = (b, hulls_b, a, hulls_a) if is_of_b else (a, hulls_a, b, hulls_b)
-        beside = references.next_above(-least, best.number, body, hulls, other, others)
-        if beside.number >= 0.0:
-            return manifold_on(references.reference_on(is_of_b, beside, beside, hulls_a, hulls_b, 0), a, b, margin)
-    return found
+@jit.kernel
+def is_any_odd(found: Manifold, hulls_a: faces.AnyHulls, margin: float) -> bool:
+    """Return True if any pair has to be looked at alone."""
+    is_odd = found.is_near & found.are_corners
+    if hulls_a is not None:
+        is_odd = is_odd | is_without_point(found, margin)
+    return not is_all(select(is_odd, 1.0, 0.0) <= 0.0)
 
 
 @jit.kernel
@@ -141,22 +140,18 @@ def manifold_of_one(
     hulls_b: faces.AnyHulls,
     margin: float,
 ) -> Manifold:
-    """Return the manifold of one pair, whose faces may face one another over a sliver, or have no point."""
-    found = manifold_on(reference, a, b, margin)
+    """Return the manifold of one pair; on a face of polygon a where there is none on the best one of b."""
+    inner = faces.least_inner(a, hulls_a, b, hulls_b)
+    found = manifold_on(reference, a, b, margin, inner)
     if hulls_a is None:
         return found
-    if not is_any_odd(found, hulls_a, hulls_b, margin):
+    if not is_without_point(found, margin):
         return found
-    of_b, of_a = reference.of_b, reference.of_a
-    if of_a.number < 0.0:
-        found = manifold_beside(True, of_b, a, hulls_a, b, hulls_b, margin)
-        if found.is_near:
-            return found
-        pose = references.pose_of(b, a)
-        of_a = references.best_from(references.farthest_face(hulls_a, pose, 0), hulls_a, pose, hulls_b, 0)
-        if of_b.gap > of_a.gap:
-            return found
-    return manifold_beside(False, of_a, a, hulls_a, b, hulls_b, margin)
+    pose = references.pose_of(b, a)
+    of_a = references.best_from(references.farthest_face(hulls_a, pose, 0), hulls_a, pose, hulls_b, 0)
+    if reference.of_b.gap > of_a.gap:
+        return found
+    return manifold_on(references.reference_on(False, reference.of_b, of_a, hulls_a, hulls_b, 0), a, b, margin, inner)
 
 
 class Meeting(NamedTuple):
@@ -175,7 +170,7 @@ def manifold_on_level(block: faces.Block, hulls: faces.AnyHulls, ground: faces.B
     side, against = faces.side_opposite(0.0, 1.0, block, hulls, 0)
     edge = faces.edge_on(face, block, side)
     points, has_point = points_of(face, edge, block, ground, True, margin)
-    return Manifold(points, has_point, True, references.Best(0.0, against, against), True, True)
+    return Manifold(points, has_point, True, references.Best(0.0, against, against), True, True, False)
 
 
 @jit.kernel
@@ -230,7 +225,7 @@ def manifold_on_segment(
     edge = faces.clip(edge, face)
     is_near = min(edge.left_gap, edge.right_gap) >= -2.0 * segment.half_y
     meeting = meeting_on(block, hulls, segment, corners, 0)
-    for k in range(1, faces.RECTANGLE if hulls is None else hulls.size):
+    for k in range(1, faces.face_count(hulls)):
         other = meeting_on(block, hulls, segment, corners, k)
         if other.gap > meeting.gap:
             meeting = other
@@ -246,4 +241,4 @@ def manifold_on_segment(
     a, b = (block, segment) if is_first else (segment, block)
     points, has_point = points_of(face, edge, a, b, is_of_block != is_first, margin)
     is_near = is_near and max(gap, meeting.gap) <= margin and has_point
-    return Manifold(points, is_near, is_first, references.Best(gap, against, against), True, True)
+    return Manifold(points, is_near, is_first, references.Best(gap, against, against), True, True, False)

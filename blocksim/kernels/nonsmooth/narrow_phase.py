@@ -174,10 +174,10 @@ def write_none(constraints: Records, places: Places) -> None:
 
 
 @jit.kernel
-def collide_four(lists: Lists, places: Places, ahead: float, corners: Any) -> None:
+def collide_four(lists: Lists, places: Places, ahead: float, corners: Any) -> int:
     """Find the manifolds of four pairs of blocks; those that press a time `ahead` (s). Without `corners`: rectangles.
 
-    Polygons whose faces hardly face one another have all four pairs looked at alone.
+    Where corners of any pair meet, all four are looked at alone. Returns how many are left UNDECIDED.
     """
     margin = lists.stepping.margin
     pairs = pairs_at(lists, places, ahead, corners, None)
@@ -185,18 +185,30 @@ def collide_four(lists: Lists, places: Places, ahead: float, corners: Any) -> No
     reference = references.reference_of(a, hulls_a, b, hulls_b, margin, None)
     if simd.is_all(reference.best.gap > margin):
         write_none(lists.constraints, places)
-        return
-    found = manifold.manifold_on(reference, a, b, margin)
-    if manifold.is_any_odd(found, hulls_a, hulls_b, margin):
+        return 0
+    found = manifold.manifold_on(reference, a, b, margin, faces.least_inner(a, hulls_a, b, hulls_b))
+    count = 0
+    if manifold.is_any_odd(found, hulls_a, margin):
         for r in places:
-            collide_one(lists, r, ahead, corners)
+            count += collide_one(lists, r, ahead, corners)
     else:
         write(lists, places, found, pairs, None)
+    return count
 
 
 @jit.kernel
-def collide_one(lists: Lists, r: int, ahead: float, corners: Any) -> None:
-    """Find the manifold of one pair, of blocks or with ground; one that presses a time `ahead` (s)."""
+def manifold_of(pair: Pairs, margin: float) -> manifold.Manifold:
+    """Return the manifold of two blocks within the margin (m) where they overlap least."""
+    reference = references.reference_of(pair.a, pair.hulls_a, pair.b, pair.hulls_b, margin, 0)
+    return manifold.manifold_of_one(reference, pair.a, pair.hulls_a, pair.b, pair.hulls_b, margin)
+
+
+@jit.kernel
+def collide_one(lists: Lists, r: int, ahead: float, corners: Any) -> int:
+    """Find the manifold of one pair, of blocks or with ground; one that presses a time `ahead` (s).
+
+    Returns 1 where it is left UNDECIDED, else 0.
+    """
     margin = lists.stepping.margin
     places = (r, r, r, r)
     pair = pairs_at(lists, places, ahead, corners, 0)
@@ -210,32 +222,42 @@ def collide_one(lists: Lists, r: int, ahead: float, corners: Any) -> None:
     elif two.faces < ALL:
         found = manifold.manifold_on_segment(a, hulls_a, b, two.corners, True, margin)
     else:
-        reference = references.reference_of(a, hulls_a, b, hulls_b, margin, 0)
-        if reference.best.gap > margin:
-            write_none(lists.constraints, places)
-            return
-        found = manifold.manifold_of_one(reference, a, hulls_a, b, hulls_b, margin)
+        found = manifold_of(pair, margin)
+    if found.is_near and found.are_corners:
+        constraint.reach = arrays.UNDECIDED
+        return 1
     if found.is_near:
         write(lists, places, found, pair, 0)
     else:
         write_none(lists.constraints, places)
+    return 0
 
 
 @jit.kernel
-def find_some(lists: Lists, begin: int, end: int, ahead: float, corners: Any) -> None:
-    """Find the manifolds of those of some constraints that have a polygon, or of those that have none."""
+def has_polygon(bodies: Records, constraint: Record) -> bool:
+    """Return True if one of the bodies of a constraint is a polygon."""
+    return bodies[constraint.a].faces == OUTLINE or bodies[constraint.b].faces == OUTLINE
+
+
+@jit.kernel
+def find_some(lists: Lists, begin: int, end: int, ahead: float, corners: Any) -> int:
+    """Find the manifolds of those of some constraints that have a polygon, or of those that have none.
+
+    Returns how many are left UNDECIDED.
+    """
     are_polygons = corners is not None
+    undecided = 0
     one, two, three, count = 0, 0, 0, 0  # places of blocks that wait for a fourth pair
     for r in range(begin, end + simd.WIDTH - 1):
         place = r
         if r < end:
             constraint = lists.constraints[r]
-            faces_a, faces_b = lists.bodies[constraint.a].faces, lists.bodies[constraint.b].faces
-            if (faces_a == OUTLINE or faces_b == OUTLINE) != are_polygons:
+            if has_polygon(lists.bodies, constraint) != are_polygons:
                 continue
-            if constraint.b != lists.bodies.size - 1 and faces_a >= ALL and faces_b >= ALL:
+            are_whole = lists.bodies[constraint.a].faces >= ALL and lists.bodies[constraint.b].faces >= ALL
+            if constraint.b != lists.bodies.size - 1 and are_whole:
                 if count == simd.WIDTH - 1:
-                    collide_four(lists, (one, two, three, r), ahead, corners)
+                    undecided += collide_four(lists, (one, two, three, r), ahead, corners)
                     count = 0
                 else:
                     one, two, three = two, three, r
@@ -246,22 +268,22 @@ def find_some(lists: Lists, begin: int, end: int, ahead: float, corners: Any) ->
             count -= 1
         else:
             break
-        collide_one(lists, place, ahead, corners)
+        undecided += collide_one(lists, place, ahead, corners)
+    return undecided
 
 
 @jit.kernel
-def find_with_polygons(lists: Lists, begin: int, end: int, ahead: float, corners: Any) -> None:
+def find_with_polygons(lists: Lists, begin: int, end: int, ahead: float, corners: Any) -> int:
     """Find the manifolds of those of some constraints that have a polygon, in scenes with any."""
-    if corners is not None:
-        find_some(lists, begin, end, ahead, corners)
+    return 0 if corners is None else find_some(lists, begin, end, ahead, corners)
 
 
 @jit.kernel
-def find_manifolds(scene: arrays.Nonsmooth, begin: int, end: int) -> None:
-    """Find the manifolds of some constraints."""
+def find_manifolds(scene: arrays.Nonsmooth, begin: int, end: int) -> int:
+    """Find the manifolds of some constraints; return how many are left UNDECIDED, for flush_joints.py."""
     contacts = scene.contacts
     stepping = contacts.stepping[0]
     ahead = 0.5 * (stepping.length - stepping.substep)
     lists = Lists(contacts.constraints, contacts.states, scene.world.bodies, stepping)
-    find_some(lists, begin, end, ahead, None)
-    find_with_polygons(lists, begin, end, ahead, scene.world.corners)
+    undecided = find_some(lists, begin, end, ahead, None)
+    return undecided + find_with_polygons(lists, begin, end, ahead, scene.world.corners)

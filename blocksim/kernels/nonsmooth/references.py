@@ -2,22 +2,16 @@
 
 Of all faces of both the reference is the one beyond which the other body reaches least (separating axes: S. Gottschalk,
 TR96-024, UNC Chapel Hill (1996)). Of rectangles that is one of four axes, and no processor can predict which, so there
-is no branch. Of polygons it is searched, face by face.
-
-Where two faces face each other over a sliver only, the bodies meet at other faces, if these are nearly parallel: a
-block that slides over the flush joint of two others would else be stopped by the side of the second, as it sinks in by
-a little. Polygons in which that may be so are looked at alone (manifold.py).
+is no branch. Of polygons it is searched, face by face. Where bodies meet with corners, other faces may be right:
+flush_joints.py.
 """
 
-import math
 from typing import NamedTuple
 
 from blocksim.kernels.common import jit, shapes
 from blocksim.kernels.common.simd import Lane, Lanes, Mask, greater, is_all, lesser, select
-from blocksim.kernels.common.tolerances import EDGE, LEVEL, TIE
+from blocksim.kernels.common.tolerances import TIE
 from blocksim.kernels.nonsmooth import arrays, faces
-
-LEVEL_COSINE = -math.sqrt(1.0 - LEVEL * LEVEL)  # of the normals of faces at that angle
 
 
 class Pose(NamedTuple):
@@ -86,14 +80,10 @@ def reference_of_rectangles(a: faces.Block, b: faces.Block) -> Reference:
     gap_ay = abs(ay) - a.half_y - s_abs * b.half_x - c_abs * b.half_y
     best_b = greater(gap_bx, gap_by)
     best_a = greater(gap_ax, gap_ay)
-    least = faces.least_half(a, b)
-    is_of_b = best_b + TIE * least >= best_a
+    is_of_b = best_b + TIE * faces.least_half(a, b) >= best_a
     of_x = select(is_of_b, gap_bx, gap_ax)
     of_y = select(is_of_b, gap_by, gap_ay)
-    # the other axis, along which they overlap by less than a sliver
-    best, other = greater(of_x, of_y), lesser(of_x, of_y)
-    passes_edge = (lesser(c_abs, s_abs) < LEVEL) & (-EDGE * least < other) & (other < best)
-    along_x = (of_x > of_y) ^ passes_edge
+    along_x = of_x > of_y
     towards = select(along_x, select(is_of_b, bx, ax), select(is_of_b, by, ay))
     sign = select(towards >= 0.0, 1.0, -1.0)
     # the face of the other body is on its other axis where it is turned by more than 45 degrees
@@ -181,24 +171,6 @@ def best_if_above(least: Lanes, tie: Lanes, hulls: faces.Hulls, pose: Pose, othe
     best = best_from(farthest, hulls, pose, other, lane)
     is_above = best.gap > least
     return Best(select(is_above, best.gap, least), select(is_above, best.number, none), best.against)
-
-
-@jit.kernel
-def next_above(
-    least: float, but: float, body: faces.Block, hulls: faces.Hulls, other: faces.Block, others: faces.Hulls
-) -> Best:
-    """Return the best face of a body but one of those with a gap above `least` (m), if nearly parallel to the other."""
-    pose = pose_of(other, body)
-    best = Best(least, -1.0, -1.0)
-    cosine = 0.0
-    for k in range(hulls.size):
-        nx, ny, distance, _ = faces.normal_at(hulls, k, 0)
-        gap, against = gap_beyond(nx * pose.x + ny * pose.y - distance, nx, ny, pose, others, 0)
-        if gap > best.gap and but != 1.0 * k:
-            best = Best(gap, 1.0 * k, against)
-            side = faces.side_at(others.table, others.first + against, 0)
-            cosine = (pose.c * nx - pose.s * ny) * side.nx + (pose.s * nx + pose.c * ny) * side.ny
-    return best if cosine < LEVEL_COSINE else Best(least, -1.0, -1.0)
 
 
 @jit.kernel

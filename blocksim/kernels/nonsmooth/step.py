@@ -12,6 +12,7 @@ from blocksim.kernels.nonsmooth import (
     arrays,
     cuts,
     energy,
+    flush_joints,
     impact_rounds,
     impacts,
     motion,
@@ -46,7 +47,7 @@ def take_step(scene: arrays.Nonsmooth, k: int, impact_lanes: Records | None) -> 
         first, last = passes.range_of_thread(0, stepping.constraint_count, k, size)
         if impact_lanes is not None and stepping.cuts > 0:
             impact_rounds.forget_struck(contacts, first, last)
-        narrow_phase.find_manifolds(scene, first, last)
+        contacts.residuals[0, 8 * k] = narrow_phase.find_manifolds(scene, first, last)
         barrier(team)
         if k == 0:
             team[STATUS] = gather(scene, impact_lanes)
@@ -138,7 +139,8 @@ def begin_step(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> int:
 @jit.kernel
 def gather(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> int:
     """Make packs of the constraints that are near; where an impact comes first, shorten the interval: UNDER_WAY."""
-    if impact_lanes is not None and scene.contacts.stepping[0].has_cuts and cuts.cut(scene):
+    flush_joints.decide_all(scene)
+    if impact_lanes is not None and scene.contacts.stepping[0].is_guarded and cuts.cut(scene):
         return UNDER_WAY
     packs.gather(scene.contacts, scene.begins)
     return REACHED
