@@ -379,6 +379,7 @@ def test_shear_is_held_back_after_some_dozen_sweeps(monkeypatch: pytest.MonkeyPa
     contacts: Any = record(stepping=[record(velocity_sweeps=1000, sweeps=0)])
     passes.velocity_pass(contacts, None, 0, 0, 1e-9)  # type: ignore[arg-type]
     assert 16 < calls.index("hold back") < 150
+    assert calls[-2:] == ["hold back", "sweep"]  # one that goes all the way
 
 
 @sides(("tilt", "is_of_block"), [(0.0034, False), (0.03, True)])

@@ -14,7 +14,9 @@ normal impulse, and the next normal impulse changes by the coupling f A_nt/A_nn 
 where that is a little less than one, and without one beyond, as with a tall block on its corner and friction of 1.4 and
 more. A share of 1/(1 + coupling) of the way to the next shear impulse is exactly that to where both stay. Constraints
 that couple so go that way in passes that have not ended after LATE sweeps. Not before: with as much friction there may
-be several solutions, and sweeps that go all the way find that in which bodies stick, if there is one.
+be several solutions, and sweeps that go all the way find that in which bodies stick, if there is one. A share of the
+way down leaves shear outside the cone, so such passes have a last sweep that goes all of it: impulses that are applied,
+kept and tallied obey Coulomb, solved or not.
 """
 
 import math
@@ -523,7 +525,9 @@ def velocity_pass(contacts: arrays.Contacts, team: Integers, k: int, task: int, 
         sweeps += 1
         largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
         task = VELOCITY
-    if sweeps > LATE:
+    if sweeps > LATE:  # whatever it leaves, within the cone
         hold_back(contacts, team, k, False)
+        sweeps += 1
+        largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
     if k == 0:
         stepping.sweeps += sweeps

@@ -9,7 +9,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.tolerances import LATE
-from blocksim.kernels.nonsmooth.arrays import FAR, TALLY_PACKS, Nonsmooth
+from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, TALLY_PACKS, Nonsmooth
 from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, VELOCITY, range_of_thread, sweep, velocity_pass
 from blocksim.kernels.nonsmooth.step import bodies_of_thread, substep
 from blocksim.world.sag import soft_contact
@@ -259,6 +259,62 @@ def test_sweeps_end_and_obey_coulomb_where_friction_couples_strongly(
             sliding += is_late
             assert shear == pytest.approx(-math.copysign(friction * normal, slip), abs=1e-8)
     assert sliding > 4
+
+
+def dominoes(seed: int) -> list[dict[str, Any]]:
+    """Return tall blocks on the ground, some of them tilted, that move towards one another (m, m/s, rad/s)."""
+    random, bodies, right = np.random.default_rng(seed), [], 0.0
+    for _ in range(6):
+        width, height = random.uniform(0.006, 0.02), random.uniform(0.02, 0.06)
+        tilt = random.uniform(-0.25, 0.25) * (random.random() < 0.4)
+        half = 0.5 * (width * math.cos(tilt) + height * abs(math.sin(tilt)))
+        low = 0.5 * (width * abs(math.sin(tilt)) + height * math.cos(tilt))
+        speed, spin = float(random.normal(0.0, 0.3)), float(random.normal(0.0, 6.0))
+        pose = {"x": right + half, "y": low + 1e-6, "angle": tilt, "velocity": [speed, 0.0], "spin": spin}
+        bodies.append({**pose, "width": width, "height": height})
+        right += 2.0 * half + random.uniform(0.001, 0.02)
+    return bodies
+
+
+@pytest.mark.parametrize("static", [1.0, 1.3])
+@pytest.mark.parametrize(("friction", "sweeps"), [(0.4, 1000), (1.5, 1000), (5.0, 1000), (5.0, 60), (8.0, 1000)])
+@pytest.mark.parametrize("seed", range(4))
+def test_whole_runs_obey_coulomb_keep_what_they_apply_and_add_up(
+    seed: int, friction: float, sweeps: int, static: float
+) -> None:
+    """After every step, solved or not: within the cone, and velocities change by the impulses that are kept."""
+    both = {"static": static * friction, "kinetic": friction}
+    law: Any = friction if static == 1.0 else both
+    run = single(
+        dominoes(seed), friction=law, ground_friction=law, restitution=0.0, velocity_sweeps=sweeps, step=2.5e-4
+    )
+    for step in range(1, 400):
+        run.to_step(step)
+        assert isinstance(run.scene, Nonsmooth)
+        contacts = run.scene.contacts
+        listed = contacts.constraints[: int(contacts.stepping[0].constraint_count)].view(np.ndarray)
+        normals, near = listed["normal_one"] + listed["normal_two"], listed["reach"] != AWAY
+        assert np.all((np.abs(listed["shear"]) <= static * friction * normals * (1.0 + 1e-12))[near])
+        changes = velocities(contacts.states) - velocities(contacts.before)
+        changes[:-1, 1] += float(contacts.stepping[0].substep) * G
+        assert momentum_of_impulses(contacts, listed[near]) == pytest.approx(changes[:, :2], abs=1e-12)
+    assert run.residual() < 1e-9
+
+
+def momentum_of_impulses(contacts: Any, listed: Any) -> NDArray[np.float64]:
+    """Return by how much the impulses that are kept change the velocities of all bodies (m/s)."""
+    normals = listed["normal_one"] + listed["normal_two"]
+    pushes = np.stack(
+        [
+            listed["nx"] * normals - listed["ny"] * listed["shear"],
+            listed["ny"] * normals + listed["nx"] * listed["shear"],
+        ],
+        axis=-1,
+    )
+    total = np.zeros((contacts.states.size, 2))
+    np.add.at(total, listed["a"], pushes)
+    np.subtract.at(total, listed["b"], pushes)
+    return np.asarray(total * contacts.states["inverse_mass"][:, None])
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 5])
