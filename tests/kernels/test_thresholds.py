@@ -382,6 +382,14 @@ def test_shear_is_held_back_after_some_dozen_sweeps(monkeypatch: pytest.MonkeyPa
     assert calls[-2:] == ["hold back", "sweep"]  # one that goes all the way
 
 
+@sides(("apart", "is_flush"), [(2.5e-6, True), (4e-5, False)])
+def test_faces_meet_as_faces_up_to_an_angle_that_no_brick_is_flat_to(apart: float, is_flush: bool) -> None:
+    stepping: Any = record(threshold=0.01)
+    for sign in (-1.0, 1.0):
+        assert bool(passes.meets_flush(-1.0, -0.5, 0.1 * sign * apart, 0.1, stepping)) == is_flush
+    assert not passes.meets_flush(-1.0, 0.5, 0.1 * apart, 0.1, stepping)  # one parts
+
+
 @sides(("tilt", "is_of_block"), [(0.0034, False), (0.03, True)])
 def test_block_that_reaches_beyond_both_ends_of_a_segment_meets_it_as_faces_while_they_are_parallel(
     tilt: float, is_of_block: bool

@@ -191,6 +191,9 @@ MOST_MARGIN = 0.5  # cost | least reach of two bodies
 
 # Rigid contacts: impulses
 
+# Faces that meet with a smaller angle meet as faces: no brick is flatter, and sag at rest tilts rows by some 1e-9.
+# x10 and /10: test_faces_meet_as_faces_up_to_an_angle_that_no_brick_is_flat_to
+FLUSH = 1e-5  # calibrated | sine of an angle
 # After so many sweeps shear that couples strongly goes a share of its way.
 # x10 and /10: test_shear_is_held_back_after_some_dozen_sweeps
 LATE = 50  # calibrated | sweeps

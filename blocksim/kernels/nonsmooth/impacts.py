@@ -7,6 +7,8 @@ are hit, with u as it is then:
 
     0 <= lambda  complementary to  J v + e u >= 0
 
+Where faces meet as faces both points are hit: passes.meets_flush.
+
 Points that pressed when the substep began and neither approach nor part push back at once (target zero): blocks that
 press on one another are struck as one. All other points wait until they are hit in a later round, also those that touch
 without pressing: in a row of blocks one is struck after the other, whether they touch or not. Rounds continue

@@ -1,11 +1,13 @@
 """Rigid blocks in motion: closed forms, energy, cuts of steps, supports, edges, impacts and groups that touch."""
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -185,6 +187,58 @@ def test_blocks_that_touch_are_struck_one_after_the_other(count: int, incoming: 
     assert run.bodies.vx == pytest.approx(expected, abs=1e-3)  # the tolerance of the velocity pass
     assert run.bodies.vx.sum() == pytest.approx(incoming, abs=1e-9)
     assert run.kinetic <= 0.5 * run.bodies.mass[0] * incoming * (1.0 + 1e-9)
+
+
+def struck_in_a_row(widths: Sequence[float], gap: float, e: float, end: float) -> NDArray[np.float64]:
+    """Return the speeds after the impacts, two bodies at a time, of a row whose first brick comes at 1 m/s."""
+    speeds: NDArray[np.float64] = np.eye(len(widths))[0]
+    ways, masses = np.zeros(len(widths)), np.array(widths)
+    time = 0.0
+    while True:
+        closing = speeds[:-1] - speeds[1:]
+        room = gap + np.diff(ways)
+        times = np.divide(room, closing, out=np.full(closing.shape, np.inf), where=closing > 1e-9)
+        first = int(np.argmin(times))
+        if time + times[first] > end:
+            return speeds
+        time += times[first]
+        ways += times[first] * speeds
+        one, two = masses[first : first + 2]
+        speeds[first : first + 2] += (1.0 + e) * closing[first] / (one + two) * np.array([-two, one])
+
+
+ROWS: dict[str, tuple[float, ...]] = {
+    "light second": (0.1, 0.05, 0.2, 0.08, 0.1),
+    "ever lighter": (0.169, 0.122, 0.086, 0.049, 0.101),
+    "light between heavy": (0.15, 0.03, 0.15, 0.03, 0.15),
+}
+
+
+@pytest.mark.parametrize("setting", ["", "mirrored", "upright", "outlines", "in a crowd", "in air"])
+@pytest.mark.parametrize("restitution", [0.9, 0.95, 1.0])
+@pytest.mark.parametrize("row", ROWS)
+def test_frontal_blow_goes_from_brick_to_brick_and_turns_none(row: str, restitution: float, setting: str) -> None:
+    """Gravity lets unequal bricks sink by unequal 1e-7 m, so that their corners do not meet at once."""
+    widths, sign, gap, end = ROWS[row], -1.0 if setting == "mirrored" else 1.0, 1.7e-3, 0.15
+    centres = np.cumsum(widths) - 0.5 * np.array(widths) + gap * np.arange(len(widths))
+    bodies: list[dict[str, Any]] = []
+    for width, place, speed in zip(widths, sign * centres, np.eye(len(widths))[0], strict=True):
+        x, y, sides, velocity = place, 0.05, (width, 0.1), [sign * speed, 0.0]
+        if setting == "upright":
+            x, y, sides, velocity = 0.0, 5.0 + place, (0.1, width), [0.0, speed]
+        shape: dict[str, Any] = {"width": sides[0], "height": sides[1]}
+        if setting == "outlines":
+            u, v = 0.5 * sides[0], 0.5 * sides[1]
+            shape = {"outline": [[-u, -v], [u, -v], [u, v], [-u, v]]}
+        bodies.append({"x": x, "y": y, "velocity": velocity, **shape})
+    idle = [{"x": 50.0 + k, "y": HEIGHT / 2} for k in range(9 if setting == "in a crowd" else 0)]
+    gravity = 0.0 if setting in {"upright", "in air"} else G
+    run = single([*bodies, *idle], restitution=restitution, gravity=gravity, **SMOOTH).to_time(end)
+    moving = run.bodies[: len(widths)]
+    expected = struck_in_a_row(widths, gap, restitution, run.time)
+    assert (moving.vy if setting == "upright" else sign * moving.vx) == pytest.approx(expected, abs=1e-8)
+    assert np.abs(run.bodies.angle).max() < 1e-9
+    assert run.residual() < 1e-9
 
 
 def test_contacts_report_the_impulses_of_all_rounds() -> None:
