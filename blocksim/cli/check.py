@@ -88,9 +88,9 @@ def _summary(scenario: Scenario, description: describe.Description) -> Iterator[
     yield from _limits(description.limits)
     rigid = description.rigid
     if rigid is not None:
-        solved = f"each solved to {MILLI * rigid.tolerance:g} mm/s"
         yield f"           {rigid.why}"
-        yield f"           in {rigid.substeps} substeps, {solved}; manual limit {rigid.longest_step:.1e} s"
+        yield f"           in {rigid.substeps} substeps; manual limit {rigid.longest_step:.1e} s"
+        yield from (f"           {line}" for line in _solving(rigid))
         sag = f"{MICRO * rigid.sag:.3g} µm at rest, block {rigid.block}"
         yield f"sag        {sag}: numerical, proportional to step squared"
         if rigid.warning:
@@ -115,6 +115,17 @@ def _summary(scenario: Scenario, description: describe.Description) -> Iterator[
         yield f"boundary   {description.particles} particles ({_use_of_particles(scenario)})"
     yield from (f"{name:<10} {count} particles or elements" for name, count in description.systems.items())
     yield f"neighbours checked up to {MILLI * description.skin:.3g} mm apart"
+
+
+def _solving(rigid: describe.SagDescription) -> Iterator[str]:
+    """Yield when the iterations of a substep end; that is all that is known before a run."""
+    if rigid.velocity_sweeps == 1:
+        yield "each with one iteration over all contacts, whatever that leaves"
+        return
+    yield f"each until no impulse changes a velocity by {MILLI * rigid.tolerance:g} mm/s,"
+    yield f"after {rigid.velocity_sweeps} iterations at most"
+    if rigid.tolerance > rigid.fall:
+        yield f"gravity does {MILLI * rigid.fall:.2g} mm/s: one iteration passes, friction may lag"
 
 
 def _limits(limits: describe.StepLimits | None) -> list[str]:

@@ -1,7 +1,7 @@
 """Many runs of scenes of one shape, advanced together in compiled code: the engine of large sweeps."""
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -38,6 +38,7 @@ class MemberEnd:
     time_step: float  # s
     rows: instruments.FrameRows = field(repr=False)  # one: the last
     observables: dict[str, Value] = field(default_factory=dict)  # observables of rows, by name
+    convergence: Mapping[str, float] | None = None  # as results.Convergence, of rigid contacts
 
     @cached_property
     def frames(self) -> trajectory.Frames:
@@ -119,6 +120,7 @@ def member_ends(
             time_step=time_steps[m],
             rows=instruments.FrameRows(steps[m], (motion[some],), measured[some], names),
             observables=observables[m],
+            convergence=schemes.scheme_of(scenes).convergence(build.member(scenes, m)),
         )
     return ends
 

@@ -45,6 +45,17 @@ class EventRecord(BaseModel, frozen=True):
     energy_J: float  # noqa: N815 - taken from what the scene holds; negative where the event has brought some in
 
 
+class Convergence(BaseModel, frozen=True):
+    """How well the impulses of rigid contacts were found, in a whole run."""
+
+    passes: int  # over all contacts, as many iterations each as it took; those of rounds of impacts too
+    unsolved: int  # of these, ended by `time.velocity_sweeps`
+    last_change_m_s: float  # largest change of a velocity in the last iteration of the last pass
+    largest_change_m_s: float  # the same of any that was ended
+    cut_rounds: int  # substeps whose impacts went on after MOST_ROUNDS rounds: what still approached was stopped
+    cut_searches: int  # rounds whose energy was made up after MOST_TRIES tries; it is exact all the same
+
+
 MOST_BYTES = input_files.MEGABYTE
 """Of run.json; a run writes two thousand."""
 
@@ -70,6 +81,7 @@ class Summary(BaseModel, frozen=True):
     resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
     last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
     energy_J: balance.EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
+    convergence: Convergence | None = None  # of rigid contacts; None in runs of earlier versions
     settled: RestState | None = None  # how it came to rest before time zero, where it did
     events: tuple[EventRecord, ...] = ()  # in the order in which they have happened
     movement: observables.Movement | None = None  # None in runs of earlier versions and without blocks

@@ -13,9 +13,11 @@ import numpy as np
 
 from blocksim.errors import OutputError
 from blocksim.kernels.common import arrays, compiler
+from blocksim.kernels.common.tolerances import MOST_ROUNDS
 from blocksim.options import silent
 from blocksim.scenario import PlacedBody, Scenario, events, motion, placement, scenario_hash
 from blocksim.scenario.models.motion import Pulse
+from blocksim.scenario.models.timeline import Nonsmooth
 from blocksim.simulation import balance, checkpoint, files, instruments, loop, observables, provenance, results, schemes
 from blocksim.simulation.interruption import WallTime, stop_requests
 from blocksim.simulation.rest_state import initial_scene
@@ -53,6 +55,8 @@ def bytes_needed(scenario: Scenario, scene: schemes.AnyScene) -> int:
 
 GAINED = 0.5  # a/w
 PROMISE = 5e-3  # error of a slip
+UNSOLVED_SHARE = 0.01  # of all velocity passes: beyond this a warning is due
+MILLI = 1e3
 SAMPLES = 20_000  # of twice the duration of a pulse
 
 
@@ -253,6 +257,7 @@ def _result(
         solver_seconds=ended.solver_seconds,
         total_seconds=seconds,
         energy_J=ended.ledger,
+        convergence=convergence_of(ended.scene),
         threads=ended.threads,
         settled=settled,
         events=ended.events,
@@ -266,6 +271,30 @@ def _result(
     return results.Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
 
 
+def convergence_of(scene: schemes.AnyScene) -> results.Convergence | None:
+    """Return how well the impulses of rigid contacts were found so far; None of other schemes."""
+    found = schemes.scheme_of(scene).convergence(scene)
+    return None if found is None else results.Convergence.model_validate(found)
+
+
+def _convergence_warnings(scenario: Scenario, found: results.Convergence | None) -> Iterator[str]:
+    """Yield warnings where impulses were not found often enough to matter, and what helps."""
+    time = scenario.time
+    if found is None or not isinstance(time, Nonsmooth):
+        return
+    if found.unsolved > UNSOLVED_SHARE * found.passes:
+        yield (
+            f"{found.unsolved / found.passes:.0%} of the velocity passes ended unsolved after time.velocity_sweeps = "
+            f"{time.velocity_sweeps}, with changes of up to {MILLI * found.largest_change_m_s:.3g} mm/s: friction and "
+            "rebounds may be off; raise time.velocity_sweeps, or shorten time.step"
+        )
+    if found.cut_rounds:
+        yield (
+            f"impacts followed from one another for more than {MOST_ROUNDS} rounds, substeps: {found.cut_rounds}; what "
+            "still approached did not rebound: shorten time.step, or lower the restitution"
+        )
+
+
 def _warnings(
     scenario: Scenario, placed: Sequence[PlacedBody], ended: loop.LoopResult, settled: results.RestState | None
 ) -> Iterator[str]:
@@ -274,6 +303,7 @@ def _warnings(
         yield f"relative energy error {residual:.1e}, above {balance.RESIDUAL_PROMISE:g}"
     if every < (1.0 - memory.ROUNDING) * float(ended.scene.world.controls[0].step):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
+    yield from _convergence_warnings(scenario, convergence_of(ended.scene))
     yield from systems.warnings_of(scenario)
     for number in ended.pending if ended.outcome.status == "finished" else ():
         what = events.describe_event(scenario.events[number])

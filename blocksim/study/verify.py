@@ -35,7 +35,8 @@ CODE = "code"
 DECIDES = ("blocksim", provenance.ROOM_PREFIX, "python", "numpy", "numba", "llvmlite", "platform", "processor", "cpu")
 ALWAYS = ("name", "steps", "time_step_s", "simulated_time_s", "energy_J")
 UNLESS_INTERRUPTED = ("reason", "exit_code")
-OF_THE_MOTION = ("settled", "events", "movement")  # what earlier versions did not keep is not there, or null
+# what earlier versions did not keep is not there, or null
+OF_THE_MOTION = ("settled", "events", "movement", "convergence")
 HASHES = ("run", "scenario_hash")  # of the code, or of what it makes of a file, too
 SAMPLE = 16  # rows, where nobody says how many
 CASE, INSIDE = "case", "inside"

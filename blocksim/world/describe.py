@@ -59,6 +59,8 @@ class SagDescription:
     why: str  # of the step
     substeps: int
     tolerance: float  # m/s, of the velocity pass
+    velocity_sweeps: int  # iterations, at most
+    fall: float  # m/s, that gravity adds in a substep
     longest_step: float  # s, that may be given by hand
     sag: float  # m, of the block that sinks most, in the initial arrangement
     block: str  # its name
@@ -136,6 +138,8 @@ def describe(scenario: Scenario) -> Description:
             why=reason.text.format(*reason.numbers),
             substeps=scenario.time.parts,
             tolerance=nonsmooth.velocity_tolerance(scenario, count),
+            velocity_sweeps=nonsmooth.stepping_of(scenario).velocity_sweeps,
+            fall=scenario.gravity * step / scenario.time.parts,
             longest_step=rigid_step.longest_step(layout, bounds, speeds),
             sag=sag.sag,
             block=sag.block,

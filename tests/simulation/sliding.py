@@ -72,6 +72,7 @@ def assert_same(one: Result, other: Result) -> None:
     """Assert that two kept runs have left the same bits: final state, table, ledger, all that is in every frame."""
     assert one.summary.final_state_sha256 == other.summary.final_state_sha256
     assert one.summary.energy_J == other.summary.energy_J
+    assert one.summary.convergence == other.summary.convergence
     assert one.folder is not None
     assert other.folder is not None
     assert (one.folder / "final.csv").read_bytes() == (other.folder / "final.csv").read_bytes()

@@ -33,6 +33,7 @@ def assert_same(end: EnsembleEnd, scenario: Scenario) -> None:
     assert isinstance(end, MemberEnd)
     assert alone.final.equals(end.final)
     assert alone.summary.energy_J == end.ledger
+    assert end.convergence == (alone.summary.convergence and alone.summary.convergence.model_dump())
     assert repr(alone.columns) == repr(end.columns)
     assert alone.summary.movement is not None
     assert end.observables.items() <= alone.summary.movement.row.items()  # one that ran alone lacks peaks

@@ -191,6 +191,27 @@ def test_wrong_value_is_named_and_energy_that_is_not_finite_survives(kept: Resul
         read_summary(tmp_path / "run.json")
 
 
+RIGID = {"time": {"scheme": "nonsmooth", "step": 1e-3}}
+
+
+@pytest.mark.parametrize("sweeps", [1, 1000])
+def test_passes_that_end_unsolved_are_in_the_summary_and_warned_of(tmp_path: Path, sweeps: int) -> None:
+    tight = {"velocity_sweeps": sweeps, "velocity_tolerance": 1e-6}
+    result = simulate_into(sliding({"time": {**RIGID["time"], **tight}}), tmp_path / "run")
+    found = read_summary(tmp_path / "run" / "run.json").convergence
+    assert found is not None
+    assert found.passes >= 4 * result.summary.steps
+    warned = [text for text in result.summary.warnings if "time.velocity_sweeps = 1," in text]
+    assert len(warned) == (sweeps == 1)
+    if sweeps == 1:
+        assert found.unsolved > 0.5 * found.passes
+        assert f"{1e3 * found.largest_change_m_s:.3g} mm/s" in warned[0]
+        assert found.largest_change_m_s > 1e-6
+    else:
+        assert (found.unsolved, found.largest_change_m_s) == (0, 0.0)
+        assert found.last_change_m_s <= 1e-6
+
+
 def test_summary_of_an_older_version_is_read(kept: Result, tmp_path: Path) -> None:
     added = ("llvmlite", "cpu", "cpu_features", "code_kernels", "code_scenario", "code_simulation", "code_world")
     data = json.loads(kept.summary.to_json())

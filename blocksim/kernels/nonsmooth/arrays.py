@@ -121,11 +121,14 @@ STEPPING = record_type(
     "touch_gap "  # m: points with no larger one touch: round-off is smaller, and must not decide
     "frequency damping "  # 1/s, -: w and zeta of points in contact
     "length gone "  # s: of the current interval of a step, and of the step before it; cuts.py
-    "last_substep",  # s: with which bodies have moved last, in the interval before
+    "last_substep "  # s: with which bodies have moved last, in the interval before
+    "residual worst_residual",  # m/s: largest change in the last sweep of a pass: the last one, any left unsolved
     "substeps "
     "velocity_sweeps "  # at most
     "colours constraint_count active_count pack_count "  # now
-    "sweeps "  # of the velocity pass, in all so far
+    "sweeps passes "  # of the velocity pass, in all so far; such passes, those of rounds of impacts too
+    "unsolved "  # of these, ended by `velocity_sweeps`
+    "cut_rounds cut_searches "  # substeps that ended at MOST_ROUNDS, rounds that ended at MOST_TRIES, so far
     "cuts "  # of the current step so far
     "has_cuts "  # flag: steps are cut at impacts; cuts.py
     "is_guarded "  # flag: impacts go one after the other, in rounds

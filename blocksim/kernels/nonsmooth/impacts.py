@@ -310,6 +310,8 @@ def solve_round(
         barrier(team)
         if not stepping.has_gain:
             break
+    if k == 0 and number == MOST_TRIES - 1:
+        stepping.cut_searches += 1
     settle(contacts, bodies, packs)
     barrier(team)
 
@@ -330,15 +332,19 @@ def follow_impacts(
     rewind(contacts, bodies[0], bodies[1])
     impact_rounds.begin_rounds(contacts, packs[0], packs[1])
     barrier(team)
+    hits = 1.0
     for number in range(MOST_ROUNDS):
         note(contacts, bodies[0], bodies[1] + (k == team[TEAM_SIZE] - 1))  # the ground, which may move, is the last
-        hits = impact_rounds.aim_round(contacts, packs[0], packs[1], number == 0)
-        if passes.agree(contacts, team, k, number, hits) == 0.0:
+        own_hits = impact_rounds.aim_round(contacts, packs[0], packs[1], number == 0)
+        hits = passes.agree(contacts, team, k, number, own_hits)
+        if hits == 0.0:
             break
         solve_round(contacts, team, k, bodies, packs)
         lacks = 2.0 * stepping.lag  # once before the round, once after it
         impact_rounds.tally_round(contacts, packs[0], packs[1], lacks * stepping.fall_x, lacks * stepping.fall_y)
         barrier(team)
+    if k == 0 and hits > 0.0:
+        stepping.cut_rounds += 1
     motion.kick_again(contacts, pushes, bodies[0], bodies[1], share)
     barrier(team)
     impact_rounds.aim_rest(contacts, packs[0], packs[1])

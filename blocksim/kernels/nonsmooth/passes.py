@@ -541,9 +541,15 @@ def velocity_pass(contacts: arrays.Contacts, team: Integers, k: int, task: int, 
         sweeps += 1
         largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
         task = VELOCITY
+    is_solved = largest <= tolerance
     if sweeps > LATE:  # whatever it leaves, within the cone
         hold_back(contacts, team, k, False)
         sweeps += 1
         largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
     if k == 0:
         stepping.sweeps += sweeps
+        stepping.passes += 1
+        stepping.residual = largest
+        if not is_solved:
+            stepping.unsolved += 1
+            stepping.worst_residual = max(stepping.worst_residual, largest)

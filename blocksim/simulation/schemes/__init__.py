@@ -147,6 +147,8 @@ class Scheme:
     overlaps: Callable[[Any], Overlaps] = lambda _: NO_OVERLAPS  # of a scene that an overlap has ended
     lost_contact: Callable[[Any, Overlaps], str] = lambda *_: ""
     # why it has ended, where not by contact.max_overlap
+    convergence: Callable[[Any], Mapping[str, float] | None] = lambda _: None
+    # how well its equations were solved so far: entries of results.Convergence
     warning: Callable[[Any, float, float], str] = lambda *_: ""
     # of contacts in a scene that has finished, given the largest overlap and the smallest side of a block (m)
 

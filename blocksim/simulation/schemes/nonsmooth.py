@@ -86,7 +86,8 @@ def begin(scene: arrays.Nonsmooth) -> None:
     for books in (contacts.tallies, scene.pushes):
         for name in books.dtype.names or ():
             books[name] = 0.0
-    contacts.stepping["sweeps"] = 0
+    for name in ("sweeps", *CONVERGENCE.values()):
+        contacts.stepping[name] = 0
     contacts.stepping["is_settled"] = 1
 
 
@@ -109,6 +110,20 @@ def overlaps_of_constraints(scene: arrays.Nonsmooth) -> schemes.Overlaps:
     )
 
 
+def convergence(scene: arrays.Nonsmooth) -> dict[str, float]:
+    """Return how well impulses were found so far."""
+    stepping = scene.contacts.stepping[0]
+    return {name: stepping[entry].item() for name, entry in CONVERGENCE.items()}
+
+
+CONVERGENCE = {  # entry of run.json, and where the kernels count it
+    "passes": "passes",
+    "unsolved": "unsolved",
+    "last_change_m_s": "residual",
+    "largest_change_m_s": "worst_residual",
+    "cut_rounds": "cut_rounds",
+    "cut_searches": "cut_searches",
+}
 RATES = ("vx", "vy", "spin")
 STILL = 1e-10  # of the smallest side of a block: way in a step at rest
 STILL_BALANCE = 1e-8  # what that counts as, beside accelerations over gravity
@@ -151,5 +166,6 @@ NONSMOOTH = schemes.Scheme(
     measure=energy.measure_nonsmooth,
     contacts=nonsmooth_contacts,
     overlaps=overlaps_of_constraints,
+    convergence=convergence,
     warning=lambda scene, overlap, side: sag.overlap_warning(overlap, sag.current_crush_depth(scene), side),
 )

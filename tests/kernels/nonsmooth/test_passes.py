@@ -8,10 +8,11 @@ import pytest
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from blocksim.kernels.common.tolerances import LATE
+from blocksim.kernels.common.tolerances import LATE, MOST_ROUNDS
 from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, TALLY_PACKS, Nonsmooth
 from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, VELOCITY, range_of_thread, sweep, velocity_pass
 from blocksim.kernels.nonsmooth.step import bodies_of_thread, substep
+from blocksim.verification.scene import WIDTH
 from blocksim.world.sag import soft_contact
 from tests.kernels.references import Dense, dense
 from tests.kernels.scenes import Block, after_substep, collided, pile, posed, single, velocities
@@ -315,6 +316,27 @@ def momentum_of_impulses(contacts: Any, listed: Any) -> NDArray[np.float64]:
     np.add.at(total, listed["a"], pushes)
     np.subtract.at(total, listed["b"], pushes)
     return np.asarray(total * contacts.states["inverse_mass"][:, None])
+
+
+def test_passes_that_end_unsolved_are_counted_with_what_they_leave() -> None:
+    blocks = pile(np.random.default_rng(0), 2, 2)
+    found = {
+        sweeps: after_substep(blocks, velocity_tolerance=1e-6, velocity_sweeps=sweeps).contacts.stepping[0]
+        for sweeps in (3, 1000)
+    }
+    assert (found[3].passes, found[3].unsolved) == (1, 1)
+    assert found[3].residual == found[3].worst_residual > 1e-6
+    assert (found[1000].passes, found[1000].unsolved, found[1000].worst_residual) == (1, 0, 0.0)
+    assert 0.0 <= found[1000].residual <= 1e-6
+
+
+def test_impacts_that_go_on_after_all_rounds_are_counted() -> None:
+    blocks: list[dict[str, Any]] = [{"x": i * WIDTH, "y": 0.2} for i in range(MOST_ROUNDS + 10)]
+    blocks[0] |= {"x": -1.3e-4, "velocity": [1.0, 0.0]}
+    for count, ends in ((MOST_ROUNDS // 2, 0), (MOST_ROUNDS + 10, 1)):
+        run = single(blocks[:count], restitution=1.0, gravity=0.0, friction=0.0).to_step(4)
+        assert isinstance(run.scene, Nonsmooth)
+        assert run.scene.contacts.stepping[0].cut_rounds == ends
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 5])
