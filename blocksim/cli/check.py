@@ -40,6 +40,10 @@ PAIR_COLUMNS = {
     "K": ("normal_stiffness", ".2e"),
     "k/K": ("shear_stiffness_ratio", ".3f"),
 }
+IMPACTS = {
+    "simultaneous": "those of one substep happen all at once",
+    "sequential": "one after the other; steps are cut at impacts",
+}
 LEAST_ROOM = 24
 HEAD = 11  # columns: width of the names on the left
 FAR_APART = 10.0  # steps of blocks and of systems beside them that are told with a cure
@@ -91,6 +95,8 @@ def _summary(scenario: Scenario, description: describe.Description) -> Iterator[
         yield f"           {rigid.why}"
         yield f"           in {rigid.substeps} substeps; manual limit {rigid.longest_step:.1e} s"
         yield from (f"           {line}" for line in _solving(rigid))
+        yield f"           defaults of these follow from {len(description.bodies)} blocks, {rigid.free} of them free"
+        yield f"impacts    {rigid.impacts}: {IMPACTS[rigid.impacts]}"
         sag = f"{MICRO * rigid.sag:.3g} µm at rest, block {rigid.block}"
         yield f"sag        {sag}: numerical, proportional to step squared"
         if rigid.warning:

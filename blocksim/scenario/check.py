@@ -156,6 +156,7 @@ def implausible_values(scenario: Scenario) -> list[str]:
                 key = overrides.format_key(("structures", number))
                 warnings.append(f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"')
     warnings += _friction_angles(scenario)
+    warnings += _impacts(scenario)
     for soil in placement.soil_tables(scenario):
         extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
         counts = geometry.count_across(soil.corners, soil.spacing)
@@ -167,6 +168,31 @@ def implausible_values(scenario: Scenario) -> list[str]:
                     f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
                 )
     return warnings
+
+
+STRONG_RESTITUTION = 0.5  # beyond which simultaneous impacts were seen to create energy
+BESIDE = 0.01  # of the smallest side: blocks no farther apart touch
+
+
+def _impacts(scenario: Scenario) -> Iterator[str]:
+    """Yield that contact.impacts has no effect, or that another value of it suits rows that pass blows on."""
+    if not scenario.time.has_rigid_contacts:
+        if scenario.contact.impacts == "sequential":
+            yield 'contact.impacts has no effect: contacts are springs; time.scheme = "nonsmooth" has rigid ones'
+        return
+    pairs = [pair.restitution or 0.0 for row in scenario.pairs.values() for pair in row.values()]
+    restitution = max(scenario.contact.restitution.block_block, *pairs, 0.0)
+    if restitution <= STRONG_RESTITUTION or scenario.contact.impacts == "sequential":
+        return
+    placed = placement.place_bodies(scenario)
+    free = [k for k, body in enumerate(placed) if not body.fixed]
+    near = BESIDE * placement.smallest_width(placed[k] for k in free)
+    if touching := overlap.first_within(placed, free, near):
+        names = " and ".join(placed[k].name for k in touching)
+        yield (
+            f"restitution {restitution:g} between blocks that touch ({names}): simultaneous impacts neither pass blows on "
+            'from block to block nor bound the energy; contact.impacts = "sequential" does'
+        )
 
 
 def _friction_angles(scenario: Scenario) -> Iterator[str]:

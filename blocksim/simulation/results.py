@@ -81,6 +81,9 @@ class Summary(BaseModel, frozen=True):
     resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
     last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
     energy_J: balance.EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
+    blocks: int | None = None  # defaults of time.step and of rigid contacts follow from these numbers
+    free_blocks: int | None = None  # at the start
+    impacts: str | None = None  # contact.impacts, of rigid contacts
     convergence: Convergence | None = None  # of rigid contacts; None in runs of earlier versions
     settled: RestState | None = None  # how it came to rest before time zero, where it did
     events: tuple[EventRecord, ...] = ()  # in the order in which they have happened

@@ -179,7 +179,7 @@ def rebound(scene: Simulation) -> float:
     while after[0, 3] == before[0, 3]:
         before, after = after, scene.to_step(scene.steps + 1).state()
     place, time = before.copy(), 0.0
-    if scene.scene.contacts.stepping[0].has_cuts:
+    if scene.scene.contacts.stepping[0].is_guarded:
         for _ in range(10):  # Newton's method
             gap, speed = gap_and_speed(before, place)
             time -= gap / speed

@@ -58,6 +58,8 @@ class SagDescription:
 
     why: str  # of the step
     substeps: int
+    impacts: str  # contact.impacts
+    free: int  # number of free blocks
     tolerance: float  # m/s, of the velocity pass
     velocity_sweeps: int  # iterations, at most
     fall: float  # m/s, that gravity adds in a substep
@@ -137,6 +139,8 @@ def describe(scenario: Scenario) -> Description:
         rigid = SagDescription(
             why=reason.text.format(*reason.numbers),
             substeps=scenario.time.parts,
+            impacts=scenario.contact.impacts,
+            free=bounds.free,
             tolerance=nonsmooth.velocity_tolerance(scenario, count),
             velocity_sweeps=nonsmooth.stepping_of(scenario).velocity_sweeps,
             fall=scenario.gravity * step / scenario.time.parts,

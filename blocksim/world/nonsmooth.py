@@ -1,23 +1,19 @@
 """Build the arrays of the non-smooth scheme from a scenario, in addition to the world that both schemes share."""
 
 import math
-from collections.abc import Callable, Sequence
-from itertools import combinations
+from collections.abc import Sequence
 
 import numpy as np
 
 from blocksim.kernels.common.arrays import CACHE_LINE, Records, World, zeros
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth import arrays, packs
-from blocksim.scenario import PlacedBody, Scenario, place_bodies, placement
+from blocksim.scenario import Scenario
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.world import build, memory, rigid_step, sag, step
 from blocksim.world.bodies import Layout
 
 MOST_REACH = 1.5  # of a body, in skins
-WEAK_RESTITUTION = 0.5  # up to which the impacts of a substep happen all at once
-BESIDE = 0.01  # of the smallest side: blocks no farther apart stand in a row
-ALONE = 2  # blocks: so few have impacts in rounds at any restitution
 FINEST, FINE, COARSE = 1e-6, 1e-3, 0.1  # m/s: tolerances of the velocity pass; see velocity_tolerance
 CROWD = 100  # blocks
 TOUCH = 1e-12  # of the smallest side: points with no larger gap touch
@@ -51,56 +47,13 @@ def velocity_tolerance(scenario: Scenario, blocks: int) -> float:
     return FINE if blocks < CROWD else COARSE
 
 
-def is_cut_at_impacts(scenario: Scenario, free: int) -> bool:
-    """Return True if steps of so many free blocks may be cut at impacts, where these go in rounds."""
-    acts = scenario.loads or scenario.actuators
-    return free < rigid_step.FEW and not acts  # cuts shift velocities by what gravity alone brings them
+def has_sequential_impacts(scenario: Scenario) -> bool:
+    """Return True if impacts of one substep follow from one another, in rounds, and steps are cut at them.
 
-
-def has_row(placed: Sequence[PlacedBody]) -> bool:
-    """Return True if free blocks stand side by side, BESIDE apart at most, and none lies on another at the start."""
-    free = [body for body in placed if not body.fixed]
-    boxes = [sag.box_of(body) for body in free]
-    near = BESIDE * placement.smallest_width(free)
-    touching = (
-        max(one.left, other.left) <= min(one.right, other.right) + near
-        and min(one.top, other.top) > max(one.bottom, other.bottom) + near
-        for one, other in combinations(boxes, 2)
-    )
-    return any(touching) and all(one.lower is None or placed[one.lower].fixed for one in sag.loads_at_rest(placed, 1.0))
-
-
-def has_impacts_in_rounds(
-    scenario: Scenario, restitution: float, free: int, placed: Callable[[], Sequence[PlacedBody]]
-) -> bool:
-    """Return True if impacts of one substep follow from one another.
-
-    Given are the greatest restitution of the scene, how many blocks are free, and what places them where that matters.
-    Up to WEAK_RESTITUTION, where no impact was seen to create energy, all impacts of a substep happen at once, and what
-    is struck in it strikes what it meets without a rebound of its own. The two are one law as steps become shorter, as
-    they differ only where two impacts fall into one substep. Rounds at any restitution would take far longer in crowds,
-    as in blocks that move in touch something rebounds in nearly every substep.
-
-    With steps that are cut at impacts rounds are right at any restitution, so that weak rebounds have them where one
-    block or two are free, and hops are what counts. Without any rebound only a single block has them: a light one below
-    a heavy one is struck again and again as it gives way. Up to twelve have them too where some stand in a row and none
-    lies on another at the start: blocks that touch, or nearly so, are struck one after the other, however small the
-    gaps are, and lose at every blow what Newton says.
+    Otherwise all impacts of a substep happen at once, and what is struck in it strikes what it meets without a rebound
+    of its own. The two are different laws where blocks touch, at every step: a row passes a blow on or moves as one.
     """
-    if restitution > WEAK_RESTITUTION or not is_cut_at_impacts(scenario, free):
-        return restitution > WEAK_RESTITUTION
-    if free <= 1:
-        return True
-    return restitution > 0.0 and (free <= ALONE or has_row(placed()))
-
-
-def needs_repeated_impacts(scenario: Scenario, placed: Sequence[PlacedBody] | None = None) -> bool:
-    """Return the same of a scenario before it is built; where not all pairs meet it may be True in vain."""
-    contact = scenario.contact
-    pairs = [pair.restitution or 0.0 for row in scenario.pairs.values() for pair in row.values()]
-    restitution = max(contact.restitution.block_block, contact.restitution.block_ground, *pairs)
-    free = sum(structure.size for structure in scenario.structures) + sum(not body.fixed for body in scenario.bodies)
-    return has_impacts_in_rounds(scenario, restitution, free, lambda: placed or place_bodies(scenario))
+    return scenario.contact.impacts == "sequential"
 
 
 def build_nonsmooth(scenario: Scenario) -> arrays.Nonsmooth:
@@ -130,9 +83,6 @@ def _stepping(layout: Layout, stride: step.Stride) -> dict[str, float]:
     time = stepping_of(layout.scenario)
     substep = stride.step / time.substeps
     soft = sag.soft_contact(substep)
-    restitution = max(material.restitution for row in layout.interactions for material in row)
-    free = sum(not body.fixed for body in layout.placed)
-    rounds = has_impacts_in_rounds(layout.scenario, restitution, free, lambda: layout.placed)
     return {
         "substep": substep,
         "length": stride.step,
@@ -147,8 +97,7 @@ def _stepping(layout: Layout, stride: step.Stride) -> dict[str, float]:
         "tolerance": velocity_tolerance(layout.scenario, len(layout.placed)),
         "substeps": time.substeps,
         "velocity_sweeps": time.velocity_sweeps,
-        "is_guarded": rounds,
-        "has_cuts": rounds and is_cut_at_impacts(layout.scenario, free),
+        "is_guarded": has_sequential_impacts(layout.scenario),
         "least_reach": 0.5 * stride.skin,
         "most_reach": MOST_REACH * stride.skin,
         "is_driven": layout.drives.driven.size > 0,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from blocksim.kernels.common.arrays import BODY, NORMAL, Record, Records, zeros
 from blocksim.kernels.nonsmooth import arrays
 from blocksim.kernels.nonsmooth.arrays import FAR, Nonsmooth
-from blocksim.kernels.nonsmooth.narrow_phase import Lists, collide_one
+from blocksim.kernels.nonsmooth.narrow_phase import Lists, collide_one, manifold_of, pairs_at, write
 
 Vector = NDArray[np.float64]
 
@@ -142,7 +142,10 @@ def meet(
     for name, value in {"margin": margin, **(stepping or {})}.items():
         all_stepping[0][name] = value
     lists = Lists(constraints, zeros(2, arrays.STATE) if states is None else states, bodies, all_stepping[0])
-    collide_one(lists, 0, ahead, None)
+    if collide_one(lists, 0, ahead, None):  # no third body presses
+        places = (0, 0, 0, 0)
+        pair = pairs_at(lists, places, ahead, None, 0)
+        write(lists, places, manifold_of(pair, margin), pair, 0)
     return constraints[0]
 
 

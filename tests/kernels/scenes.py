@@ -21,6 +21,7 @@ from blocksim.kernels.common.shapes import place_corners
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.kernels.nonsmooth.flush_joints import decide_all
 from blocksim.kernels.nonsmooth.motion import load_states
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
@@ -149,10 +150,19 @@ def listed(scene: Nonsmooth) -> Nonsmooth:
     return scene
 
 
+def find_all(scene: Nonsmooth, part: int | None = None) -> None:
+    """Find the manifolds of all pairs of a scene, so many at a time."""
+    count = int(scene.contacts.stepping[0].constraint_count)
+    begins = range(0, count, part or max(count, 1))
+    undecided = [find_manifolds(scene, k, min(k + (part or count), count)) for k in begins]
+    scene.contacts.residuals[0, 0] = sum(undecided)
+    decide_all(scene)
+
+
 def collided(scene: Nonsmooth) -> Nonsmooth:
     """Return a scene with the manifolds of its pairs, packed in packs."""
     scene = listed(scene)
-    find_manifolds(scene, 0, int(scene.contacts.stepping[0].constraint_count))
+    find_all(scene)
     gather(scene.contacts, scene.begins)
     pack_all(scene.contacts, 0, int(scene.contacts.stepping[0].pack_count))
     return scene

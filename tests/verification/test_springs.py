@@ -168,5 +168,5 @@ def test_energy_that_friction_took_and_nobody_tallied_is_noticed() -> None:
 def test_energy_from_rebounds_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     throws = [Throw(radians(4.0), friction, phase) for friction in (0.7, 1.0) for phase in (0.1, 0.3, 0.5, 0.7, 0.9)]
     assert impacts.largest_gain(Thrower(SETTING, 1.0), throws) < impacts.ROUND_OFF
-    monkeypatch.setattr(nonsmooth, "has_impacts_in_rounds", lambda *_: False)  # nobody watches
+    monkeypatch.setattr(nonsmooth, "has_sequential_impacts", lambda *_: False)  # nobody watches
     assert impacts.largest_gain(Thrower(SETTING, 1.0), throws) > 1e-3

@@ -31,11 +31,8 @@ J v - t >= 0, with the target t = -e u where the approach u before the substep w
 gravity does meanwhile: passes.rebound), and -max(s, 0) / h elsewhere. What the position pass adds to velocities moves
 bodies, but is gone after the velocity pass.
 
-Impacts that follow from one another go in rounds instead (in crowds only where restitution is high; see
-world/nonsmooth.py), and create no energy:
-impacts.py, impact_rounds.py.
-
-Where few blocks rebound (two at all, up to twelve above 0.5), and of a single one, steps are cut at impacts: cuts.py.
+With `contact.impacts = "sequential"` impacts that follow from one another go in rounds instead, and create no energy:
+impacts.py, impact_rounds.py; and steps are cut at impacts: cuts.py.
 
 Gravity kicks half a substep at first and whole ones then: velocities live half a substep before positions (leap-frog).
 """

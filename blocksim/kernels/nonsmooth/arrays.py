@@ -130,8 +130,7 @@ STEPPING = record_type(
     "unsolved "  # of these, ended by `velocity_sweeps`
     "cut_rounds cut_searches "  # substeps that ended at MOST_ROUNDS, rounds that ended at MOST_TRIES, so far
     "cuts "  # of the current step so far
-    "has_cuts "  # flag: steps are cut at impacts; cuts.py
-    "is_guarded "  # flag: impacts go one after the other, in rounds
+    "is_guarded "  # flag: impacts go one after the other, in rounds, and steps are cut at them; impacts.py, cuts.py
     "is_driven "  # flag: bodies move differently from the supports
     "is_settled "  # flag: the run begins at rest, with impulses that hold against gravity
     "is_shaken "  # flag: supports or driven bodies move, so that impulses on them do work
@@ -179,7 +178,7 @@ class Nonsmooth(NamedTuple):
     contacts: Contacts
     kept: Records  # (p,) KEPT, work space of a new pair list and of flush joints
     reaches: Floats  # (n + 1,) m: how far beyond each body its neighbours were sought; of the ground zero
-    firsts: Integers  # (n + 1,) work space: the first old constraint of a body a, from 1; 0 where there is none
+    firsts: Integers  # (n + 1,) likewise: the first old constraint of a body a, from 1; 0 where there is none
     begins: Integers  # (COLOURS + 1,) where every colour begins among the constraints
     used: Integers  # (n + 1,) work space: bits of the colours that a body's pairs have
     pushes: Records  # (n + 1,) PUSH; one of no use without loads

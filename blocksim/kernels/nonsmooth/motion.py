@@ -199,7 +199,7 @@ def kick_by_loads(scene: arrays.Nonsmooth, number: int, first: int, last: int, s
     Bodies that were warm-started have that of the last substep once more, of which there was a share `last_share`.
     """
     h = scene.contacts.stepping[0].substep
-    time = scene.world.clock[0].steps * scene.world.controls[0].step + number * h
+    time = cuts.begin_of_interval(scene) + number * h
     loads.accelerations(scene.world, scene.contacts.states, scene.pushes, first, last, time)
     new = share * h
     old = last_share * h

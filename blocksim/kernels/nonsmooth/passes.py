@@ -227,7 +227,7 @@ def aim(contacts: arrays.Contacts, pack: Record, lane: Lane, link: packs.Link) -
         pull = pulls(link, stepping)
         after_one = rebound(u.one, load(lane, pack.start_one), pull, restitution, stepping)
         after_two = rebound(u.two, load(lane, pack.start_two), pull, restitution, stepping)
-        rebounds = restitution > (-1.0 if stepping.has_cuts else 0.0)  # then it is an impact without any rebound too
+        rebounds = restitution > (-1.0 if stepping.is_guarded else 0.0)  # then it is an impact without any rebound too
         t_one = select(rebounds & (u.one < -stepping.threshold) & (t_one > -arrays.FAR), after_one, t_one)
         t_two = select(rebounds & (u.two < -stepping.threshold) & (t_two > -arrays.FAR), after_two, t_two)
         if stepping.is_guarded and not is_all(greater(t_one, t_two) <= 0.0):

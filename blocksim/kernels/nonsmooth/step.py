@@ -131,7 +131,7 @@ def begin_step(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> int:
     """Bring the list of neighbours up to date, and begin a step with one interval; return UNDER_WAY or PAIRS_FULL."""
     if not neighbours.update_pairs(scene):
         return PAIRS_FULL
-    if impact_lanes is not None and scene.contacts.stepping[0].has_cuts:
+    if impact_lanes is not None and scene.contacts.stepping[0].is_guarded:
         cuts.begin_interval(scene, True)
     return UNDER_WAY
 
@@ -158,7 +158,7 @@ def prepare(scene: arrays.Nonsmooth, number: int, share: float) -> None:
     stepping.fall_x = stepping.pull_x = stepping.substep * controls.gravity_x
     stepping.fall_y = stepping.pull_y = stepping.substep * controls.gravity_y
     if scene.world.loads.size > 0:
-        time = scene.world.clock[0].steps * controls.step + number * stepping.substep
+        time = cuts.begin_of_interval(scene) + number * stepping.substep
         ax, ay = motion.pull_of_loads(scene.world, time)
         stepping.pull_x += stepping.substep * ax
         stepping.pull_y += stepping.substep * ay

@@ -12,6 +12,7 @@ from blocksim.scenario import laws, units as q
 from blocksim.scenario.models.base import OneOf, Table, setting
 
 Model = Annotated[Literal["surface", "particles", "kernel"], OneOf(("surface", "particles", "kernel"))]
+Impacts = Annotated[Literal["simultaneous", "sequential"], OneOf(("simultaneous", "sequential"))]
 SUPPORT = {"wendland-c2": 2.0, "cubic-spline": 2.0, "quintic-spline": 3.0}
 """Radius at which a kernel function ends, in smoothing lengths."""
 Kernel = Annotated[Literal["wendland-c2", "cubic-spline", "quintic-spline"], OneOf(tuple(SUPPORT))]
@@ -117,6 +118,11 @@ class Contact(Table):
         f"how the force grows with the overlap: {' or '.join(laws.LAWS)}", laws.LINEAR.name
     )
     restitution: Restitution = setting("rebound speed over impact speed", Restitution())
+    impacts: Impacts = setting(
+        "impacts within one substep, rigid contacts only: simultaneous, or sequential: one after the other, with steps "
+        "cut at impacts, for single blocks that bounce or rock, rows that pass blows on, and restitution above 0.5",
+        "simultaneous",
+    )
     stiffness_scale: q.PositiveNumber = setting("factor on the stiffness of every contact", 1.0)
     normal_stiffness: q.Stiffness | None = setting(
         "stiffness of one contact point, linear law only (default: from the materials)", None

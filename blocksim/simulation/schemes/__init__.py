@@ -22,7 +22,7 @@ from blocksim.errors import BlocksimError, InvalidInputError, OutputError
 from blocksim.kernels.common import arrays, compiler, jit, systems
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.options import silent
-from blocksim.scenario import PlacedBody, Scenario, motion, overlap, placement, scenario_from_mapping
+from blocksim.scenario import Scenario, motion, overlap, placement, scenario_from_mapping
 from blocksim.scenario.models.timeline import SCHEMES as TABLES
 from blocksim.simulation import trajectory
 from blocksim.world import build as scenes
@@ -124,9 +124,7 @@ class Scheme:
     # compiling: sets of machine code by name
     kernels: Callable[[str], str]  # that it needs with a contact model
     of_outlines: Mapping[str, str] = field(default_factory=dict)  # the set instead of another, with any polygon
-    kernel_variant: Callable[[str, Scenario, Sequence[PlacedBody] | None], str] = lambda scene, *_: (
-        scene
-    )  # of a set, for a scenario
+    kernel_variant: Callable[[str, Scenario], str] = lambda kernels, _: kernels  # of a set, for a scenario
     kernel_sets: Mapping[str, Mapping[str, object]] = field(default_factory=dict)  # changes of the smallest scene
 
     # settling before time zero
@@ -340,13 +338,13 @@ SMALLEST_SCENE = {
 }
 
 
-def kernels_of(scenario: Scenario, placed: Sequence[PlacedBody] | None = None) -> str:
-    """Return which set of kernels a scenario needs; `placed` are its bodies, where they are known."""
+def kernels_of(scenario: Scenario) -> str:
+    """Return which set of kernels a scenario needs."""
     scheme = SCHEMES[scenario.time.scheme]
     kernels = scheme.kernels(scenario.contact.model)
     if placement.has_outlines(scenario):
         kernels = scheme.of_outlines.get(kernels, kernels)
-    return scheme.kernel_variant(kernels, scenario, placed)
+    return scheme.kernel_variant(kernels, scenario)
 
 
 @functools.cache

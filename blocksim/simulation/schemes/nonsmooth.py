@@ -130,9 +130,8 @@ STILL_BALANCE = 1e-8  # what that counts as, beside accelerations over gravity
 SETTLING = schemes.SettlingSteps(call=2, part=40, most=40_000, least_share=0.01)
 RIGID, OF_OUTLINES = "nonsmooth", "outlines"  # sets of machine code
 IN_ROUNDS = {RIGID: "nonsmooth-in-rounds", OF_OUTLINES: "outlines-in-rounds"}  # where impacts follow from one another
-TWO = [{"block": "any", "x": x, "y": 0.5} for x in (0.0, 5.0)]  # impacts of a single block are always in rounds
-PLAIN: dict[str, object] = {"time": {"scheme": RIGID}, "contact": {"restitution": 0.0}, "bodies": TWO}
-ROUNDS: dict[str, object] = {"time": {"scheme": RIGID}, "contact": {"restitution": 0.5}}
+PLAIN: dict[str, object] = {"time": {"scheme": RIGID}}
+ROUNDS: dict[str, object] = {"time": {"scheme": RIGID}, "contact": {"impacts": "sequential"}}
 POLYGON = {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}}
 
 NONSMOOTH = schemes.Scheme(
@@ -149,8 +148,8 @@ NONSMOOTH = schemes.Scheme(
     after_event=renew,
     kernels=lambda _: RIGID,
     of_outlines={RIGID: OF_OUTLINES},
-    kernel_variant=lambda kernels, scenario, placed: (
-        IN_ROUNDS[kernels] if nonsmooth.needs_repeated_impacts(scenario, placed) else kernels
+    kernel_variant=lambda kernels, scenario: (
+        IN_ROUNDS[kernels] if nonsmooth.has_sequential_impacts(scenario) else kernels
     ),
     kernel_sets={
         RIGID: PLAIN,

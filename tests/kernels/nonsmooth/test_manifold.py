@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from blocksim.kernels.common.arrays import Record, zeros
 from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, STEPPING, TOUCHING, Nonsmooth
 from blocksim.kernels.nonsmooth.faces import Edge, Face, clip
-from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.slip import Constraints, Motion, bend_of, bend_time, follow_curvature, slip_of
 from blocksim.scenario.geometry import Corners
 from blocksim.verification.scene import HEIGHT, WIDTH
@@ -22,6 +21,7 @@ from tests.kernels.scenes import (
     HEXAGON,
     Block,
     depth_below,
+    find_all,
     listed,
     listed_constraints,
     make_body,
@@ -54,7 +54,7 @@ def manifolds(scene: Nonsmooth, blocks: Sequence[Block]) -> Any:
     constraints = listed_constraints(scene)
     for name in ("normal_one", "normal_two", "shear"):
         constraints[name] = 0.0
-    find_manifolds(scene, 0, constraints.size)
+    find_all(scene)
     return constraints
 
 
@@ -141,7 +141,7 @@ def test_rectangles_given_as_outlines_have_the_same_manifolds() -> None:
 
 @pytest.mark.parametrize("kind", ["polygons", "flush", "rectangles"])
 def test_four_pairs_at_a_time_have_the_manifolds_that_each_has_alone(kind: str) -> None:
-    """To the last bit, as threads divide pairs anywhere; flush blocks have faces that face one another over slivers."""
+    """To the last bit, as threads divide pairs anywhere; of flush blocks corners meet."""
     random = np.random.default_rng(11)
     blocks = [block for pair in (*pairs(random), *pairs(random, is_rectangle=True)) for block in pair]
     if kind == "rectangles":
@@ -156,11 +156,10 @@ def test_four_pairs_at_a_time_have_the_manifolds_that_each_has_alone(kind: str) 
         corners = constraints["corner_two"].copy(), constraints["corner_one"].copy()
         constraints["corner_one"], constraints["corner_two"] = corners
         before = constraints.copy()
-        find_manifolds(scene, 0, constraints.size)
+        find_all(scene)
         together = constraints.copy()
         constraints[:] = before
-        for r in range(constraints.size):
-            find_manifolds(scene, r, r + 1)
+        find_all(scene, part=1)
         near = together["reach"] != AWAY
         assert near.sum() >= 8
         assert constraints["reach"].tolist() == together["reach"].tolist()
@@ -168,17 +167,18 @@ def test_four_pairs_at_a_time_have_the_manifolds_that_each_has_alone(kind: str) 
             assert constraints[name][near].tolist() == together[name][near].tolist(), name
 
 
-def test_polygon_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_next() -> None:
+@pytest.mark.parametrize("pressed", [True, False])
+def test_corners_meet_along_what_presses_a_third_body_and_else_where_they_overlap_least(pressed: bool) -> None:
     """A hexagon slides over the flush joint of two blocks, and overlaps the side of the second by a hair only."""
     blocks = over_a_joint(0.0, 0.0, 5e-5)
-    constraints = {
-        (int(constraint.a), int(constraint.b)): constraint for constraint in manifolds(posed(blocks), blocks)
-    }
-    for first in (0, 1):
-        constraint = constraints[first, 2]
-        if constraint.reach != AWAY:
-            assert (constraint.nx, constraint.ny) == pytest.approx((0.0, -1.0), abs=1e-12)
+    scene = posed(blocks)
+    constraints = {(int(one.a), int(one.b)): one for one in manifolds(scene, blocks)}
     assert constraints[0, 2].reach == TOUCHING
+    constraints[0, 2].normal_one = 1.0 if pressed else 0.0
+    find_all(scene)
+    normal = (constraints[1, 2].nx, constraints[1, 2].ny)
+    assert constraints[1, 2].reach == TOUCHING
+    assert (normal == pytest.approx((0.0, -1.0), abs=1e-12)) is pressed
 
 
 @pytest.mark.parametrize("ground", ["half-plane", "piece", "block"])
@@ -199,7 +199,7 @@ def test_impulses_go_with_the_corner_that_a_block_rolls_over(outline: Corners, h
         scene.world.clock[0].rebuilds = 0
         scene = listed(scene)
         constraints = listed_constraints(scene)
-        find_manifolds(scene, 0, constraints.size)
+        find_all(scene)
         (constraint,) = [constraint for constraint in constraints if constraint.reach != AWAY and constraint.a == 0]
         if not pivot:
             pressed = "one" if constraint.gap_one < constraint.gap_two else "two"
@@ -215,15 +215,6 @@ def test_impulses_go_with_the_corner_that_a_block_rolls_over(outline: Corners, h
 
 
 MARGIN = 2e-3  # m
-
-
-@pytest.mark.parametrize(("sunk", "way"), [(5e-6, -1.0), (5e-6, 1.0), (5e-5, 1.0)])
-def test_block_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_next(sunk: float, way: float) -> None:
-    """It overlaps the side of the next block by less than it has sunk into it: separating axes alone would stop it."""
-    slider = make_body(way * (0.032 - 0.1 * sunk), 0.025 - sunk)
-    constraint = meet(slider, make_body(), MARGIN)
-    assert (constraint.nx, constraint.ny) == (0.0, 1.0)
-    assert min(constraint.gap_one, constraint.gap_two) == pytest.approx(-sunk, abs=1e-15)
 
 
 @pytest.mark.parametrize(("degrees", "is_kept"), [(24.0, True), (-24.0, True), (26.0, False), (180.0, False)])

@@ -243,7 +243,7 @@ def test_frontal_blow_goes_from_brick_to_brick_and_turns_none(row: str, restitut
 
 def test_contacts_report_the_impulses_of_all_rounds() -> None:
     run = single(row(1e-4), restitution=1.0, gravity=0.0, substeps=1, **SMOOTH)
-    run.scene.contacts.stepping[0].has_cuts = 0  # it would be in an interval each
+    run.scene.contacts.stepping[0].is_guarded = 0  # it would be in an interval each
     before = run.bodies.vx.copy()
     run.to_step(1)
     constraints = run.scene.contacts.constraints[: run.scene.contacts.stepping[0].constraint_count]
