@@ -151,20 +151,25 @@ def _limits(limits: describe.StepLimits | None) -> list[str]:
 
 
 def _statics(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:
-    """Yield whether the blocks are in equilibrium as they are placed, where statics has an answer."""
+    """Yield whether an equilibrium of the blocks is possible as they are placed, where statics has an answer."""
     if len(placed) > MOST_BLOCKS:
         return
     with suppress(InvalidInputError):
         blocks = Blockwork.of(scenario)
         from blocksim.statics.programme import horizontal_margin
 
-        margin = horizontal_margin(blocks)
-        if margin is None:
+        margins = horizontal_margin(blocks)
+        if margins is None:
             yield "statics    no equilibrium: it cannot stand as it is placed"
-        elif math.isfinite(margin):
-            yield f"statics    in equilibrium, up to a horizontal acceleration of {margin:.3g} g at most"
+            return
+        margin, estimate = margins
+        yield "statics    an equilibrium is possible; whether it is reached from rest, runs decide"
+        if math.isfinite(margin):
+            yield f"           up to a horizontal acceleration of {margin:.3g} g at most"
         else:
-            yield "statics    in equilibrium, whatever the horizontal acceleration"
+            about = f", at about {estimate:.3g} g, an estimate" if math.isfinite(estimate) else ""
+            yield "           statics sets no bound on a horizontal acceleration:"
+            yield f"           joints that slip without opening may give way{about}"
 
 
 def _unscaled(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:

@@ -26,6 +26,7 @@ from blocksim.statics.blockwork import Blockwork
 from blocksim.world.joints import Floats
 
 MANY = 500  # blocks, from which on interior points are faster
+FEW = 100  # blocks, up to which estimates and islands take seconds
 HALF = 0.5
 PASSES = 40  # at most, for an estimate
 STARTS = (0.0, 0.25, 0.5)  # of the bound: where an estimate begins
@@ -63,6 +64,8 @@ class Programme:
             return sparse.coo_array(entries, shape=(3 * count + 3, points.size)).tocsr()[: 3 * count].tocsc()
 
         self.across, self.along = columns(assembly.across), columns(assembly.along)
+        sliding = self.along * structure.friction
+        self.extremes = sparse.hstack([self.across + sliding, self.across - sliding], format="csc")
 
     def carries(self, forces: Floats) -> Equilibrium:
         """Return the greatest factor up to one on forces (n, 3): one where they are in equilibrium, zero where not.
@@ -80,8 +83,7 @@ class Programme:
 
     def _cone(self, dead: Floats, live: Floats, span: tuple[float, float]) -> Equilibrium | None:
         friction, points = self.structure.friction, self.structure.friction.size
-        sliding = self.along * friction
-        matrix = sparse.hstack([self.across + sliding, self.across - sliding, self._column(live)], format="csc")
+        matrix = sparse.hstack([self.extremes, self._column(live)], format="csc")
         cost = np.append(np.zeros(2 * points), -1.0)
         result = self._solved(cost, matrix, dead, [(0.0, None)] * (2 * points) + [span])
         if result is None:
@@ -97,7 +99,16 @@ class Programme:
 
     def estimate(self, dead: Floats, live: Floats, bound: float) -> float:
         """Return the least factor that was found of joints that slip without opening; the bound where none was less."""
-        return min([bound, *(self._flat(dead, live, share * bound) for share in STARTS)])
+        reach = bound if np.isfinite(bound) else 1.0
+        return min([bound, *(self._flat(dead, live, share * reach) for share in STARTS)])
+
+    def missing(self, forces: Floats) -> float:
+        """Return the least sum of forces, over the weight, with which these (n, 3) would be in equilibrium."""
+        count, rows = self.extremes.shape[1], self.extremes.shape[0]
+        one = sparse.identity(rows)
+        cost = np.append(np.zeros(count), np.ones(2 * rows))
+        matrix = sparse.hstack([self.extremes, one, -one], format="csc")
+        return float(self._solved(cost, matrix, forces, [(0.0, None)] * (count + 2 * rows)).fun)
 
     def _flat(self, dead: Floats, live: Floats, first: float) -> float:
         """Return the factor of joints that slip without opening, from the most even forces at a first factor."""
@@ -116,10 +127,10 @@ class Programme:
         matrix = sparse.hstack([self.across, self.along, empty, self._column(live)], format="csc")
         cost = np.concatenate([np.zeros(2 * points), np.full(points, NEAR), [-1.0]])
         bounds = [(0.0, None)] * points + [(None, None)] * points + [(0.0, None)] * points + [(None, None)]
-        even = self._even(dead + first * live)
+        even = self.even(dead + first * live, live)
         if even is None:
             return np.inf
-        normal = even
+        normal = even[0]
         for _ in range(PASSES):
             cohesion = normal * (friction - flat)
             result = self._solved(cost, matrix, dead, bounds, cone, [cohesion, cohesion, normal, -normal])
@@ -130,17 +141,19 @@ class Programme:
                 return float(result.x[-1])
         return np.inf
 
-    def _even(self, forces: Floats) -> Floats | None:
-        """Return the normal forces (p,) of an equilibrium whose greatest is least, in the weight; None without one."""
+    def even(self, dead: Floats, live: Floats, most: float = 0.0) -> tuple[Floats, float] | None:
+        """Return the normal forces (p,) of an equilibrium whose greatest is least, in the weight; None without one.
+
+        And the factor on live forces there, from 0 to `most`.
+        """
         points = self.structure.friction.size
-        sliding = self.along * self.structure.friction
-        empty = sparse.csc_array((self.across.shape[0], 1))
-        matrix = sparse.hstack([self.across + sliding, self.across - sliding, empty], format="csc")
+        matrix = sparse.hstack([self.extremes, self._column(0.0 * live), self._column(live)], format="csc")
         one = sparse.identity(points)
-        rows = sparse.hstack([one, one, -np.ones((points, 1))], format="csc")
-        cost = np.append(np.full(2 * points, EVEN), 1.0)
-        result = self._solved(cost, matrix, forces, [(0.0, None)] * (2 * points + 1), rows, [np.zeros(points)])
-        return None if result is None else np.add(*np.split(result.x[:-1], 2))
+        rows = sparse.hstack([one, one, -np.ones((points, 1)), sparse.csc_array((points, 1))], format="csc")
+        cost = np.append(np.full(2 * points, EVEN), [1.0, 0.0])
+        bounds = [(0.0, None)] * (2 * points + 1) + [(0.0, most)]
+        result = self._solved(cost, matrix, dead, bounds, rows, [np.zeros(points)])
+        return None if result is None else (np.add(*np.split(result.x[:-2], 2)), float(result.x[-1]))
 
     def _column(self, forces: Floats) -> Any:
         return sparse.csc_array((forces * self.scale).reshape(-1, 1) / self.weight)
@@ -165,10 +178,16 @@ class Programme:
         return result
 
 
-def horizontal_margin(blocks: Blockwork) -> float | None:
-    """Return the least horizontal acceleration, over gravity, that ends the equilibrium; None where there is none."""
-    programme = Programme(blocks)
+def horizontal_margin(blocks: Blockwork) -> tuple[float, float] | None:
+    """Return the least horizontal acceleration, over gravity, that ends the equilibrium; None where there is none.
+
+    The second one is an estimate of joints that slip without opening, where the first one is infinite; else the same.
+    """
+    programme, ways = Programme(blocks), [way * blocks.horizontal for way in (-1.0, 1.0)]
     if not programme.carries(blocks.forces).factor:
         return None
-    ends = (programme.greatest(blocks.forces, way * blocks.horizontal) for way in (-1.0, 1.0))
-    return min(0.0 if end is None else end.factor for end in ends)
+    ends = (programme.greatest(blocks.forces, way) for way in ways)
+    margin = min(0.0 if end is None else end.factor for end in ends)
+    if np.isfinite(margin) or len(blocks.names) > FEW:
+        return margin, margin
+    return margin, min(programme.estimate(blocks.forces, way, margin) for way in ways)

@@ -322,7 +322,7 @@ class _Search:
         """Return the answer, after all runs that it takes."""
         plan, folder = self.plan, self.runs.manifest.path.parent
         has_islands = plan.scenario.motion is not None  # a value may fall between others that stand: supports move
-        bound, near = (None, None) if plan.has_scan else self._foretold()
+        statics, near = (None, None) if plan.has_scan else self._foretold()
 
         def choose(rows: Rows) -> list[Number]:
             if near is not None:
@@ -339,11 +339,11 @@ class _Search:
         brackets = [self._bracket(change, rows) for change in limit_plan.changes_in(plan.verdicts(rows))]
         others, is_as_given = (self.stiff_rows, self.step_rows), self.stiffer is False
         return limit_answer.LimitAnswer.of(
-            plan, folder, rows, brackets, *others, run=self.runs.new, is_as_given=is_as_given, static_bound=bound
+            plan, folder, rows, brackets, *others, run=self.runs.new, is_as_given=is_as_given, statics=statics
         )
 
-    def _foretold(self) -> tuple[float | None, Change[Stability] | None]:
-        """Return the value beyond which statics knows no equilibrium, and a bracket about it; none of several."""
+    def _foretold(self) -> tuple[dict[str, object] | None, Change[Stability] | None]:
+        """Return the only value beyond which statics knows no equilibrium, and the side; and a bracket about it."""
         from blocksim.study import static_limit  # noqa: PLC0415 - scipy takes a third of a second
 
         plan, limit = self.plan, static_limit.bound_of(self.plan)
@@ -355,7 +355,8 @@ class _Search:
             way = BEYOND_ESTIMATE * (limit.bound - limit.estimate)
             ends = sorted([limit.estimate - HALF * way, limit.estimate + way])
         low, high = map(plan.span.clip, ends)
-        return limit.bound, self._on_springs(Change(low, high, sides[limit.below], sides[limit.above]))
+        statics = {"static_bound": limit.bound, "static_side": limit.side}
+        return statics, self._on_springs(Change(low, high, sides[limit.below], sides[limit.above]))
 
     def _on_springs(self, near: Change[Stability]) -> Change[Stability]:
         """Return a bracket of equilibria on springs, found without time and as narrow as can be; if none, that given.

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, Field, InstanceOf, model_serializer, model_validator
 
@@ -190,6 +190,13 @@ class RangeAnswer(Answer, frozen=True):
         return {"key": plan.key, "unit": plan.unit, **ends, **kinds}
 
     @property
+    def unseen(self) -> str:
+        """What a scan may miss, in words."""
+        spacing = with_unit((self.high - self.low) / (self.count - 1), self.unit)
+        spacing = f"a {self.count - 1}th of the range" if self.is_log else spacing
+        return f"islands narrower than {spacing}, between values of the scan, may be missed: --scan N for more values"
+
+    @property
     def vary(self) -> dict[str, dict[str, object]]:
         """The key and its range, as they are given to a search."""
         ends: dict[str, object] = {"from": self.low, "to": self.high}
@@ -211,6 +218,7 @@ class LimitAnswer(RangeAnswer, frozen=True):
     scheme: str
     stiffness_scale: float | None
     static_bound: float | None = None  # beyond it no equilibrium exists; the search began there
+    static_side: Literal["above", "below"] | None = None  # where that is
     runs: int
     brackets: tuple[Bracket, ...] = Field(alias="changes")
     is_as_given: bool = Field(default=False, exclude=True)  # neither stiffness nor step was corrected
@@ -229,7 +237,7 @@ class LimitAnswer(RangeAnswer, frozen=True):
         *,
         run: int,
         is_as_given: bool,
-        static_bound: float | None = None,
+        statics: Mapping[str, object] | None = None,
     ) -> Self:
         """Make the answer of a search; `stiffer` has rows by stiffness scale, `finer` by time step (s)."""
         scenario = plan.scenario
@@ -251,7 +259,7 @@ class LimitAnswer(RangeAnswer, frozen=True):
                 "stands": plan.criterion.text,
                 "scheme": scenario.time.scheme,
                 "stiffness_scale": scale,
-                "static_bound": static_bound,
+                **(statics or {}),
                 "runs": len(cells),
                 "changes": brackets,
                 "folder": folder,
@@ -306,10 +314,7 @@ class LimitAnswer(RangeAnswer, frozen=True):
             notes.append("undecided: blocks were still moving at the end; increase time.end to decide")
         notes += self.warnings()
         if plan is not None and not self.is_whole and (plan.scenario.motion is not None or not self.brackets):
-            spacing = with_unit((self.high - self.low) / (self.count - 1), self.unit)
-            spacing = f"a {self.count - 1}th of the range" if self.is_log else spacing
-            which = f"islands narrower than {spacing}, between values of the scan, are not seen"
-            notes.append(f"{which}: --scan N for more values")
+            notes.append(self.unseen)
         notes.append(f"{self.runs} runs, {self.run} of them now: {self.folder / 'limit.csv'}")
         if any({one.below.value, one.above.value} <= self.case_folders.keys() for one in self.falls):
             notes.append(f"picture of the mechanism: blocksim plot {self.folder}")
@@ -334,14 +339,14 @@ class LimitAnswer(RangeAnswer, frozen=True):
         )
 
     def _statics(self) -> Iterator[str]:
-        """Yield the bound by statics, where the search began there, and whether a run stands beyond it."""
+        """Yield the bound by statics, where the search began there, and whether runs stand beyond it."""
         bound = self.static_bound
-        if bound is None:
+        if bound is None or self.static_side is None:
             return
+        yield f"no equilibrium {self.static_side} {with_unit(bound, self.unit)} (statics)"
         for one in self.limits:
-            is_up = one.above is Stability.FALLS
-            yield f"no equilibrium {'above' if is_up else 'below'} {with_unit(bound, self.unit)} (statics)"
-            beyond = one.low - bound if is_up else bound - one.high
+            stands = one.low if one.above is Stability.FALLS else one.high
+            beyond = stands - bound if self.static_side == "above" else bound - stands
             if beyond > self.tolerance * abs(bound):
                 yield f"warning: runs stand beyond what statics can carry, by {beyond / abs(bound):.2%}"
 

@@ -211,12 +211,16 @@ def changes_in(known: Mapping[Number, Kind]) -> list[Change[Kind]]:
 
 
 def next_values(
-    span: SearchRange, known: Mapping[Number, Kind], tolerance: float, peaks: Mapping[Number, float] | None = None
+    span: SearchRange,
+    known: Mapping[Number, Kind],
+    tolerance: float,
+    peaks: Mapping[Number, Any] | None = None,
+    halvings: int = HALVINGS,
 ) -> list[Number]:
     """Return the values to try next; none when every change is as narrow as wanted.
 
-    `peaks` are the largest rotations at those known values at which the scan may have to be denser: half way to both
-    neighbours of one that is larger than theirs, where all three come to the same.
+    `peaks` are the largest rotations, or whatever else, at those known values at which the scan may have to be denser:
+    half way to both neighbours of one that is larger than theirs, where all three come to the same, `halvings` times.
     """
     peaks = peaks or {}
     scan = [value for value in span.grid() if value not in known]
@@ -229,7 +233,7 @@ def next_values(
             for ends in ((low, here), (here, high)):
                 length = math.log(ends[1] / ends[0]) if span.is_log else ends[1] - ends[0]
                 whole = math.log(span.high / span.low) if span.is_log else (span.high - span.low)
-                is_near = length / whole * (span.count - 1) < 1.5 * 0.5**HALVINGS
+                is_near = length / whole * (span.count - 1) < 1.5 * 0.5**halvings
                 if not (is_near or (span.is_whole and ends[1] - ends[0] <= 1.0)):
                     scan += span.between(*ends, parts=2)
     if scan:

@@ -7,19 +7,19 @@ blocksim/statics/programme.py.
 """
 
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic import BaseModel
 
-from blocksim.errors import ExitCode, InvalidInputError
+from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.options import takes
 from blocksim.scenario import Document, Source, document_of, place_bodies
 from blocksim.statics.blockwork import MOST_BLOCKS, Blockwork
 from blocksim.statics.joint_forces import BlockMotion, JointForce, block_motions, joint_forces
-from blocksim.statics.programme import Equilibrium, Programme
+from blocksim.statics.programme import FEW, Equilibrium, Programme
 from blocksim.study import limit_plan, sweep
 from blocksim.study.answer import Overview, Study, with_unit
 from blocksim.study.limit_answer import UNIT, RangeAnswer
@@ -28,11 +28,11 @@ from blocksim.study.rows import Head
 from blocksim.study.sweep_folder import FolderKind
 from blocksim.view import style, thrust
 
-POSSIBLE, NONE = "equilibrium", "none"
+POSSIBLE, NONE = "possible", "none"
 SAME = 1e-9  # of the weight: difference of forces that is none
 SLIGHT = 1e-4  # of a bound: an estimate that is nearer says nothing else
 EXACT = 1e-6  # of a value: a bracket costs little
-FEW = 100  # blocks, up to which estimates take seconds
+ISLAND = 12  # halvings of the spacing of a scan, about the least that is missing to an equilibrium
 
 
 class StaticLimit(BaseModel, frozen=True):
@@ -52,17 +52,20 @@ class StaticLimit(BaseModel, frozen=True):
         return self.high if self.above == NONE else self.low
 
     @property
+    def side(self) -> str:
+        """Where no equilibrium exists, seen from the bound."""
+        return "above" if self.above == NONE else "below"
+
+    @property
     def value(self) -> float:
-        """The value on the side with an equilibrium."""
+        """The value on the side where an equilibrium is possible."""
         return self.low if self.above == NONE else self.high
 
     def lines(self, unit: str) -> Iterator[str]:
         """Yield the answer in words."""
-        side = "above" if self.above == NONE else "below"
-        bound = with_unit(self.bound, unit)
-        yield f"no equilibrium {side} {bound}"
+        yield f"no equilibrium {self.side} {with_unit(self.bound, unit)}"
         if self.high > self.low:
-            yield f"an equilibrium at {with_unit(self.value, unit)}"
+            yield f"an equilibrium is possible at {with_unit(self.value, unit)}"
         if self.estimate is not None:
             yield f"joints that slip without opening: about {with_unit(self.estimate, unit)}, an estimate"
 
@@ -79,6 +82,7 @@ class StaticAnswer(RangeAnswer, frozen=True):
     blocks: int
     is_linear: bool  # the key changes forces alone, and in proportion
     limits: tuple[StaticLimit, ...]
+    estimates: tuple[float, ...] = ()  # of joints that slip without opening, where statics sets no bound
 
     @classmethod
     def of(cls, plan: LimitPlan, folder: Path, found: "StaticSearch") -> Self:
@@ -89,6 +93,7 @@ class StaticAnswer(RangeAnswer, frozen=True):
                 "blocks": found.blocks,
                 "is_linear": found.is_linear,
                 "limits": found.limits,
+                "estimates": found.estimates,
                 "folder": folder,
                 "heads": (str(Head("value", plan.unit)), "verdict"),
                 "cells": sorted(found.verdicts.items()),
@@ -97,17 +102,18 @@ class StaticAnswer(RangeAnswer, frozen=True):
 
     def overview(self) -> Overview:
         """Return what is known of both ends of the range and of every limit."""
-        lines = [line for one in self.limits for line in one.lines(self.unit)]
-        ends = [self.cells[0], self.cells[-1]] if self.cells else []
-        if not lines and ends:
-            lines = [f"{'no ' if ends[0][1] == NONE else 'an '}equilibrium at all values of the range"]
+        lines = [*(line for one in self.limits for line in one.lines(self.unit)), *self._unbounded()]
         shown = {self.low, self.high, *(end for one in self.limits for end in (one.low, one.high))}
         notes = ["statics: rigid blocks as placed, Coulomb's friction; springs and impacts have no part in it"]
+        if POSSIBLE in dict(self.cells).values():
+            notes.append("whether a possible equilibrium is reached from rest, runs decide: leave --static out")
+        if not self.is_linear:
+            notes.append(self.unseen)
         notes.append(f"{len(self.cells)} values: {self.folder / 'static.csv'}")
         if self.limits:
             notes.append(f"thrust and mechanism: blocksim plot {self.folder}")
         return Overview(
-            f"{self.key}, statics of {self.blocks} blocks",
+            f"{self.key}, equilibrium of {self.blocks} blocks by statics",
             (f"value {self.unit}".rstrip(), "verdict"),
             [[f"{value:.9g}", str(verdict)] for value, verdict in self.cells if value in shown],
             left=2,
@@ -117,6 +123,19 @@ class StaticAnswer(RangeAnswer, frozen=True):
             code=ExitCode.SUCCESS if self.limits else ExitCode.OUTSIDE,
         )
 
+    def _unbounded(self) -> Iterator[str]:
+        """Yield what is so where nothing changes, and where joints may give way that statics takes for locked."""
+        values = "all values of the range" if self.is_linear else f"all {len(self.cells)} values that were tried"
+        if not self.limits and NONE in dict(self.cells).values():
+            yield f"no equilibrium at {values}"
+        elif not self.limits:
+            yield f"statics sets no bound in this range: an equilibrium is possible at {values}"
+        if self.estimates or (not self.limits and POSSIBLE in dict(self.cells).values()):
+            at = " and ".join(with_unit(value, self.unit) for value in self.estimates)
+            yield "joints that slip without opening may give way earlier" + (
+                f": at about {at}, an estimate" if at else ""
+            )
+
     def draw(self, path: Path, title: str, paper: style.Paper) -> None:
         """Draw the first limit: forces in joints with the line of thrust, and the mechanism beside them."""
         if not self.limits:
@@ -124,7 +143,7 @@ class StaticAnswer(RangeAnswer, frozen=True):
         one = self.limits[0]
         setting = limit_plan.setting(self.key, one.value, self.unit, is_whole=self.is_whole)
         scenario = Document.read(self.folder / self.files.plan, is_stored=True).with_values(setting).build()
-        heads = f"{POSSIBLE} at {self.key} = {with_unit(one.value, self.unit)}", "a mechanism beyond it"
+        heads = f"an equilibrium is possible at {self.key} = {with_unit(one.value, self.unit)}", "a mechanism beyond it"
         thrust.draw_thrust(scenario, one.joints, one.mechanism, heads, path, title, paper)
 
 
@@ -175,13 +194,32 @@ class StaticSearch(NamedTuple):
     is_linear: bool
     limits: list[StaticLimit]
     verdicts: dict[Number, str]  # of all values that were tried
+    estimates: list[Number]  # where joints may slip without opening, within the range and where there is no bound
+
+
+Found = tuple[list[StaticLimit], dict[Number, str], list[Number]]
+
+
+@contextmanager
+def _at(plan: LimitPlan, value: Number) -> Iterator[None]:
+    """Name the value at which statics has no answer. Raises InvalidInputError."""
+    try:
+        yield
+    except BlocksimError as error:
+        where = f"{plan.key} = {with_unit(value, plan.unit)}"
+        raise InvalidInputError(f"{where}: {str(error).splitlines()[0]}") from error
+
+
+def _structure_at(plan: LimitPlan, value: Number) -> Blockwork:
+    with _at(plan, value):
+        return Blockwork.of(plan.scenario_at(value))
 
 
 def search_statics(plan: LimitPlan) -> StaticSearch:
     """Return where equilibrium begins or ends in the range of a plan. Raises InvalidInputError; see `Blockwork.of`."""
     span = plan.span
     middle = next(iter(span.between(span.low, span.high, parts=2)), span.low)
-    low, half, high = (Blockwork.of(plan.scenario_at(at)) for at in (span.low, middle, span.high))
+    low, half, high = (_structure_at(plan, at) for at in (span.low, middle, span.high))
     is_linear = not span.is_whole and all(low.has_joints_of(one) for one in (half, high))
     if is_linear:
         share = (middle - span.low) / (span.high - span.low)
@@ -191,13 +229,13 @@ def search_statics(plan: LimitPlan) -> StaticSearch:
     return StaticSearch(blocks, is_linear, *(_ends(plan, low, high) if is_linear else _tried(plan)))
 
 
-def _ends(plan: LimitPlan, low: Blockwork, high: Blockwork) -> tuple[list[StaticLimit], dict[Number, str]]:
+def _ends(plan: LimitPlan, low: Blockwork, high: Blockwork) -> Found:
     """Return the limits of a key that changes forces in proportion, and verdicts at both ends of the range."""
     programme, change, width = Programme(low), high.forces - low.forces, plan.span.high - plan.span.low
     limits, verdicts = [], dict.fromkeys((plan.span.low, plan.span.high), NONE)
     down, up = (programme.greatest(low.forces, sign * change) for sign in (-1.0, 1.0))
     if down is None or up is None:
-        return [], verdicts
+        return [], verdicts, []
     possible = [at for at, share in zip(verdicts, (0.0, 1.0), strict=True) if -down.factor <= share <= up.factor]
     verdicts |= dict.fromkeys(possible, POSSIBLE)
     for sign, end in ((-1.0, down), (1.0, up)):
@@ -215,25 +253,41 @@ def _ends(plan: LimitPlan, low: Blockwork, high: Blockwork) -> tuple[list[Static
             )
             limits.append(limit)
             verdicts[value] = POSSIBLE
-    return limits, verdicts
+    estimates: list[Number] = []
+    even = programme.even(low.forces, change, 1.0) if len(low.names) <= FEW else None
+    if even is not None:
+        base = even[1]  # where no joint is locked by more than the forces need
+        for sign, end in ((-1.0, down), (1.0, up)):
+            at = base + sign * programme.estimate(low.forces + base * change, sign * change, end.factor - sign * base)
+            if 0.0 < at < 1.0 and not 0.0 < sign * end.factor < 1.0:
+                estimates.append(plan.span.clip(plan.span.low + at * width))
+    return limits, verdicts, estimates
 
 
-def _tried(plan: LimitPlan) -> tuple[list[StaticLimit], dict[Number, str]]:
-    """Return the limits of a key of which every value is tried by itself, and all verdicts."""
+def _tried(plan: LimitPlan) -> Found:
+    """Return the limits of a key of which every value is tried by itself, and all verdicts.
+
+    Where there is no equilibrium on either side, values are tried about the one to which the least is missing.
+    """
     tried: dict[Number, tuple[Blockwork, Equilibrium]] = {}
     verdicts: dict[Number, str] = {}
+    nearest: dict[Number, tuple[float, float]] = {}  # the less is missing the greater; no two are equal
     tolerance = min(plan.tolerance, EXACT)
-    while values := limit_plan.next_values(plan.span, verdicts, tolerance):
+    while values := limit_plan.next_values(plan.span, verdicts, tolerance, nearest, ISLAND):
         for value in values:
-            structure = Blockwork.of(plan.scenario_at(value))
-            tried[value] = structure, Programme(structure).carries(structure.forces)
-            verdicts[value] = POSSIBLE if tried[value][1].factor else NONE
+            structure = _structure_at(plan, value)
+            with _at(plan, value):
+                programme = Programme(structure)
+                tried[value] = structure, programme.carries(structure.forces)
+                verdicts[value] = POSSIBLE if tried[value][1].factor else NONE
+                if verdicts[value] == NONE and len(structure.names) <= FEW:
+                    nearest[value] = -programme.missing(structure.forces), value
     limits = []
     for change in limit_plan.changes_in(verdicts):
         stands, falls = (change.low, change.high) if change.above == NONE else (change.high, change.low)
         joints, mechanism = joint_forces(*tried[stands]), block_motions(*tried[falls])
         limits.append(StaticLimit(**vars(change), joints=joints, mechanism=mechanism))
-    return limits, verdicts
+    return limits, verdicts, []
 
 
 def repeat_static(answer: StaticAnswer, _: sweep.Replay, out: Path) -> StaticAnswer:

@@ -125,9 +125,17 @@ def test_water_pushes_as_its_integral_and_a_dam_slides_at_the_friction_of_static
 def test_the_horizontal_margin_is_that_of_the_weaker_side() -> None:
     blocks = {"b": brick(0.2, 0.4)}
     stands = blockwork(0.9, blocks=blocks, bodies=[{"block": "b", "x": 0.0, "y": 0.2}], ground={"tilt": "10 deg"})
-    assert horizontal_margin(stands) == pytest.approx(math.tan(math.atan(0.5) - math.radians(10.0)), rel=1e-6)
+    expected = math.tan(math.atan(0.5) - math.radians(10.0))
+    assert horizontal_margin(stands) == pytest.approx((expected, expected), rel=1e-6)
     falls = blockwork(0.9, blocks=blocks, bodies=[{"block": "b", "x": 0.0, "y": 0.2}], ground={"tilt": "30 deg"})
     assert horizontal_margin(falls) is None
+
+
+def test_the_horizontal_margin_of_a_block_below_a_lid_is_an_estimate_of_its_friction() -> None:
+    """A lid that it would have to lift as it slides makes the bound infinite."""
+    bodies = [{"block": "b", "x": 0.0, "y": 0.1}, {"block": "b", "x": 0.0, "y": 0.3, "fixed": True}]
+    found = horizontal_margin(blockwork(0.4, blocks={"b": brick(0.4, 0.2)}, bodies=bodies))
+    assert found == pytest.approx((math.inf, 0.4), rel=2e-3)
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def mapped(one: Jet, value: float, slope: float) -> Jet:
 
 @rare_kernel
 def powered(one: Jet, exponent: float) -> Jet:
-    """Return a number that is not negative to a power of more than one."""
+    """Return a positive number to a power."""
     slope = one.value ** (exponent - 1.0)
     return mapped(one, one.value * slope, exponent * slope)
 

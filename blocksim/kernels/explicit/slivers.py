@@ -92,6 +92,17 @@ def depth_behind(of_b: bool, face: int, corner: int, a: Record, b: Record, table
 
 
 @rare_kernel
+def axis_depth(axis: Axis, a: Record, b: Record, table: Corners) -> Jet:
+    """Return the depth (m) of an axis: to the last digit what `axis_of` has found.
+
+    The nearest axis is deeper than zero, and by that all are: of weights and of energies none is divided by zero. The
+    sum of depth_behind rounds otherwise: where corners meet, it may be zero or less.
+    """
+    jet = depth_behind(axis.of_b, axis.face, axis.corner, a, b, table)
+    return Jet(axis.depth, jet.x, jet.y, jet.turn)
+
+
+@rare_kernel
 def place_along(of_b: bool, face: int, corner: int, a: Record, b: Record, table: Corners) -> Jet:
     """Return the place (m) of a corner of the other body along a face of b, or of a, from where that begins."""
     body, other = (b, a) if of_b else (a, b)
@@ -148,7 +159,7 @@ def across_from(axis: Axis, across: int, deep: Jet, wide: Jet, a: Record, b: Rec
     own = axis.face if is_last else sides.next_number(body, table, axis.face)
     outer = depth_behind(not axis.of_b, across, own, a, b, table)
     shallow = blended(inner, outer, ahead, wide)
-    deepest = depth_behind(axis.of_b, axis.face, axis.corner, a, b, table)
+    deepest = axis_depth(axis, a, b, table)
     half = mapped(wide, 0.5 * wide.value, 0.5)
     shallow = blended(shallow, deepest, plus(length, half, -1.0), half)  # an interval without length has one end only
     some = length if length.value > 0.0 else mapped(length, 0.0, 0.0)
@@ -180,7 +191,7 @@ def energy_of_faces(
     tilt = tilt_of(axis, across, a, b, table)
     up = stepped(tilt, flat, sides.cone_of(a, b, table))
     parallel = plus(CONSTANT_ONE, stepped(tilt, flat, 2.0 * flat), -1.0)
-    depth = depth_behind(axis.of_b, axis.face, axis.corner, a, b, table)
+    depth = axis_depth(axis, a, b, table)
     reach = mapped(depth, tolerances.ONE_END * depth.value, tolerances.ONE_END)
     wide = product(plus(CONSTANT_ONE, long, -1.0), reach)
     deep = product(plus(CONSTANT_ONE, product(parallel, long), -1.0), reach)
@@ -198,12 +209,6 @@ class Nearness(NamedTuple):
     weight: Jet  # W
     shallow: Jet  # 1 - v: zero where another axis than that of the face across is about as deep
     long: Jet  # zero where the overlap is so short that corners at an end of it are blended
-
-
-@rare_kernel
-def axis_depth(axis: Axis, a: Record, b: Record, table: Corners) -> Jet:
-    """Return the depth (m) of an axis."""
-    return depth_behind(axis.of_b, axis.face, axis.corner, a, b, table)
 
 
 @rare_kernel

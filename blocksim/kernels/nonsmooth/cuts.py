@@ -165,7 +165,8 @@ def cut(scene: arrays.Nonsmooth) -> bool:
     fine = FINE * scene.world.controls[0].step
     time = time_to_impact(scene)
     length = time - 0.5 * fine if time > fine else fine
-    if length >= stepping.length:
+    is_all = stepping.gone + length >= scene.world.controls[0].step  # to round-off: what is left has a length
+    if length >= stepping.length or is_all:
         return False
     set_length(scene, length)
     return True
