@@ -119,13 +119,20 @@ PAIRS = {
 WAY, PLACES, DEPTH = 1e-3, 500, 1e-4  # m, -, m
 
 
-def past_corner(one: Outline, two: Outline, angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return places (m, m, rad) of a body on a way on which its corner passes one of another at (1, 1), and the way."""
+def at_corner(
+    one: Outline, two: Outline, angle: float, depth: float
+) -> tuple[NDArray[np.float64], tuple[float, float]]:
+    """Return the place (m, m, rad) of a body whose corner is so deep (m) in one of another at (1, 1); the way out."""
     length = hypot(*two[1])
     out_x, out_y = two[1][0] / length, two[1][1] / length
     turn = atan2(-out_y, -out_x) - atan2(one[0][1], one[0][0]) + angle
     x, y = cos(turn) * one[0][0] - sin(turn) * one[0][1], sin(turn) * one[0][0] + cos(turn) * one[0][1]
-    start = np.array([1.0 + two[1][0] - DEPTH * out_x - x, 1.0 + two[1][1] - DEPTH * out_y - y, turn])
+    return np.array([1.0 + two[1][0] - depth * out_x - x, 1.0 + two[1][1] - depth * out_y - y, turn]), (out_x, out_y)
+
+
+def past_corner(one: Outline, two: Outline, angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return places (m, m, rad) of a body on a way on which its corner passes one of another at (1, 1), and the way."""
+    start, (out_x, out_y) = at_corner(one, two, angle, DEPTH)
     way = np.array([out_y, -out_x, 0.05])
     return start + np.linspace(-0.5 * WAY, 0.5 * WAY, PLACES)[:, np.newaxis] * way, way
 
@@ -148,6 +155,20 @@ def test_energy_of_a_sliver_has_no_step_and_the_force_is_its_slope(name: str) ->
         work = 0.5 * (slopes[1:] + slopes[:-1]) * WAY / (PLACES - 1)
         assert np.abs(np.diff(energies) - work).max() < 3e-3 * energies.max()
     assert len(faces) > 3
+
+
+@pytest.mark.parametrize(("one", "two"), [(HEXAGON, HEXAGON), (WEDGE, HEXAGON)])
+def test_energy_of_corners_that_are_round_off_deep_is_that_of_their_depth(one: Outline, two: Outline) -> None:
+    """As of drawn stones that share a corner: by another sum the same depth is twice as much, or zero."""
+    pair, random, found = Pair(one, two), np.random.default_rng(1), 0
+    for angle in np.linspace(-0.3, 0.3, 400):
+        nearest = pair.put(at_corner(one, two, float(angle), random.uniform(0.0, 4e-16))[0])
+        if nearest.depth > 0.0:
+            jet = slivers.mean_energy(nearest, 2.0, pair.a, pair.b, pair.world.corners)
+            assert 0.0 < jet.value <= 1.5 * nearest.depth**2
+            assert np.isfinite(jet).all()
+            found += 1
+    assert found > 200
 
 
 PAST, SHALLOW = 2e-4, 1e-5  # m
