@@ -100,12 +100,17 @@ class StaticAnswer(RangeAnswer, frozen=True):
             }
         )
 
+    @property
+    def is_possible(self) -> bool:
+        """Whether an equilibrium is possible at any value."""
+        return any(row[1] == POSSIBLE for row in self.cells)
+
     def overview(self) -> Overview:
         """Return what is known of both ends of the range and of every limit."""
         lines = [*(line for one in self.limits for line in one.lines(self.unit)), *self._unbounded()]
         shown = {self.low, self.high, *(end for one in self.limits for end in (one.low, one.high))}
         notes = ["statics: rigid blocks as placed, Coulomb's friction; springs and impacts have no part in it"]
-        if POSSIBLE in dict(self.cells).values():
+        if self.is_possible:
             notes.append("whether a possible equilibrium is reached from rest, runs decide: leave --static out")
         if not self.is_linear:
             notes.append(self.unseen)
@@ -126,15 +131,14 @@ class StaticAnswer(RangeAnswer, frozen=True):
     def _unbounded(self) -> Iterator[str]:
         """Yield what is so where nothing changes, and where joints may give way that statics takes for locked."""
         values = "all values of the range" if self.is_linear else f"all {len(self.cells)} values that were tried"
-        if not self.limits and NONE in dict(self.cells).values():
+        if not (self.limits or self.is_possible):
             yield f"no equilibrium at {values}"
         elif not self.limits:
             yield f"statics sets no bound in this range: an equilibrium is possible at {values}"
-        if self.estimates or (not self.limits and POSSIBLE in dict(self.cells).values()):
+        if self.estimates or (self.is_possible and not self.limits):
             at = " and ".join(with_unit(value, self.unit) for value in self.estimates)
-            yield "joints that slip without opening may give way earlier" + (
-                f": at about {at}, an estimate" if at else ""
-            )
+            about = f": at about {at}, an estimate" if at else ""
+            yield f"joints that slip without opening may give way earlier{about}"
 
     def draw(self, path: Path, title: str, paper: style.Paper) -> None:
         """Draw the first limit: forces in joints with the line of thrust, and the mechanism beside them."""

@@ -133,9 +133,10 @@ BESIDE = "rows of particles on a rough base the active thrust on blocks is some"
         ({"gradient": "raw"}, {"x": -0.026}, 0.4, []),  # more than a spacing away
         ({"gradient": "raw"}, {"fixed": True}, 0.4, []),  # feels the pressure at rest, which is right
         ({"gradient": "raw"}, {"x": 0.05, "y": 0.16}, 0.4, []),  # lies on top
-        ({}, {}, 0.4, []),
-        ({"y": [0.0, 0.05]}, {}, 0.4, [f"soils.column.spacing: with corrected gradients and 10 {BESIDE} 6% "]),
-        ({"y": [0.0, 0.08]}, {}, 0.4, []),
+        ({}, {}, 0.4, [f"soils.column.spacing: with corrected gradients and 20 {BESIDE} 4% "]),
+        ({}, {}, 0.0, []),
+        ({"y": [0.0, 0.05]}, {}, 0.4, [f"soils.column.spacing: with corrected gradients and 10 {BESIDE} 8% "]),
+        ({"y": [0.0, 0.08]}, {}, 0.4, [f"soils.column.spacing: with corrected gradients and 16 {BESIDE} 5% "]),
     ],
 )
 def test_thrust_that_is_known_to_be_too_small_is_warned_of(
@@ -149,6 +150,28 @@ def test_thrust_that_is_known_to_be_too_small_is_warned_of(
     assert [text.partition("too small")[0] for text in found] == expected
     if expected:
         assert found == blocksim.run(held).summary.warnings
+
+
+def test_thrust_of_walls_that_go_on_is_warned_of_by_what_was_measured() -> None:
+    """K of smooth walls drawn back from 21.9 degrees by 3 mm of 100 mm, with 10, 14 and 20 rows; Rankine's is 0.457."""
+    blocks = {"wall": {"width": 0.12, "height": 0.12, "length": DEPTH, "material": "smooth"}}
+    for rows, measured in ((10, 0.3827), (14, 0.4001), (20, 0.4137)):
+        table = column(0.1, 0.1, 0.1 / rows)
+        (text,) = describe(scene(table, blocks=blocks, bodies=[{**WALL, "x": -0.06}])).warnings
+        share = float(text.partition("of its height, ")[2].partition("%")[0])
+        assert share == pytest.approx(100.0 * (1.0 - measured / 0.4567), abs=1.0)
+
+
+TURNS = {"kind": "gravity", "to": "5 deg", "rate": "1 deg/s"}
+
+
+@pytest.mark.parametrize("load", [{"kind": "horizontal", "magnitude": 0.1}, TURNS])
+def test_loads_that_soil_does_not_feel_are_warned_of(load: dict[str, Any]) -> None:
+    table = column(0.1, 0.1, 0.005)
+    (text,) = describe(scene(table, loads=[{**load, "name": "push"}])).warnings
+    assert text.startswith("loads.push: soil does not feel this load, blocks alone do")
+    force = {"kind": "force", "body": "1", "magnitude": 1.0}
+    assert not describe(scene(table, loads=[force])).warnings
 
 
 SPACING = 0.005
