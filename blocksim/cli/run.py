@@ -13,6 +13,7 @@ import typer
 
 from blocksim.cli import command_line, compare, output, prepare, progress
 from blocksim.options import Option
+from blocksim.scenario import after_end
 from blocksim.simulation import Result, files, loop, observables, rest_state, trajectory
 from blocksim.simulation.run import RunCallbacks
 from blocksim.study import compare as judgement, rows, run
@@ -149,5 +150,6 @@ def _end_lines(result: Result) -> Iterator[str]:
         )
     if moved is not None and summary.reason != loop.REST.reason and moved.fastest_m_s > result.scenario.time.rest_speed:
         yield f"not at rest: block {moved.fastest_block} at {moved.fastest_m_s:.2g} m/s"
-    yield from (f"warning: {text}" for text in summary.warnings)
+    before = set(after_end.cut_off(result.scenario))  # with the values that are hardly meant
+    yield from (f"warning: {text}" for text in summary.warnings if text not in before)
     yield ""

@@ -9,7 +9,7 @@ from typing import get_args
 
 from pydantic import ValidationError
 
-from blocksim.scenario import geometry, mistakes, overrides, placement, start, units
+from blocksim.scenario import after_end, geometry, mistakes, overrides, placement, start, units
 from blocksim.scenario.models import base, contact, study, timeline
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.structures import polygons
@@ -131,7 +131,8 @@ MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the 
 def implausible_values(scenario: Scenario) -> list[str]:
     """Return a warning for each value that looks like one in another unit, of frictions swept ones too.
 
-    Also for soils of whose width or height no whole number of particles takes all, with a finer spacing that does.
+    Also for soils of whose width or height no whole number of particles takes all, with a finer spacing that does, and
+    for what the end of the run cuts off.
     """
     warnings = []
     for name, material in scenario.materials.items():
@@ -167,7 +168,7 @@ def implausible_values(scenario: Scenario) -> list[str]:
                     f"{overrides.format_key(('soils', soil.name, 'spacing'))} = {1e3 * soil.spacing:.4g} mm fills "
                     f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
                 )
-    return warnings
+    return [*warnings, *after_end.cut_off(scenario)]
 
 
 STRONG_RESTITUTION = 0.5  # beyond which simultaneous impacts were seen to create energy

@@ -336,9 +336,7 @@ def _course(motion: Ramp | Rotation, way: float, end: float) -> MotionPieces:
     """Return the pieces of a way (m or rad) from the start of a motion on, until `end` (s) at least."""
     count = PIECES_OF_A_RAMP if motion.course == "smooth" else 1
     share = np.linspace(0.0, 1.0, count + 1)
-    speed = (motion.speed if isinstance(motion, Ramp) else motion.spin) or math.nan
-    steepest = 15.0 / 8.0 if motion.course == "smooth" else 1.0  # greatest speed over its mean
-    duration = abs(way) / speed * steepest if motion.duration is None else motion.duration
+    duration = motion.resolved_duration
     times = motion.start + duration * share
     if count == 1:
         pieces = MotionPieces(times, np.array([[0.0, way / duration, 0.0, 0.0]]), 0.0)

@@ -15,7 +15,7 @@ from blocksim.errors import OutputError
 from blocksim.kernels.common import arrays, compiler
 from blocksim.kernels.common.tolerances import MOST_ROUNDS
 from blocksim.options import silent
-from blocksim.scenario import PlacedBody, Scenario, events, motion, placement, scenario_hash
+from blocksim.scenario import PlacedBody, Scenario, after_end, events, motion, placement, scenario_hash
 from blocksim.scenario.models.motion import Pulse
 from blocksim.scenario.models.timeline import Nonsmooth
 from blocksim.simulation import balance, checkpoint, files, instruments, loop, observables, provenance, results, schemes
@@ -304,6 +304,7 @@ def _warnings(
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > balance.RESIDUAL_PROMISE:
         yield f"relative energy error {residual:.1e}, above {balance.RESIDUAL_PROMISE:g}"
+    yield from after_end.cut_off(scenario)
     if every < (1.0 - memory.ROUNDING) * float(ended.scene.world.controls[0].step):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     yield from _convergence_warnings(scenario, convergence_of(ended.scene))

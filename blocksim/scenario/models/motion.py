@@ -302,6 +302,11 @@ class Ramp(Table):
     course: Course = setting("constant (at once at full speed) or smooth (starts and ends without a jerk)", "constant")
     start: q.NonNegativeTime = setting("start of the motion; the body rests before", 0.0)
 
+    @property
+    def resolved_duration(self) -> float:
+        """Time (s) from start to end."""
+        return _duration(self, self.distance, self.speed)
+
     def _check(self) -> None:
         require_one("give duration or speed", duration=self.duration, speed=self.speed)
 
@@ -319,10 +324,21 @@ class Rotation(Table):
     course: Course = setting("constant (at once at full spin) or smooth (starts and ends without a jerk)", "constant")
     start: q.NonNegativeTime = setting("start of the motion; the body rests before", 0.0)
 
+    @property
+    def resolved_duration(self) -> float:
+        """Time (s) from start to end."""
+        return _duration(self, self.angle, self.spin)
+
     def _check(self) -> None:
         require_one("give duration or spin", duration=self.duration, spin=self.spin)
         if self.angle == 0.0:
             raise q.invalid("a turn by 0 is none", "angle")
+
+
+def _duration(moved: Ramp | Rotation, way: float, greatest: float | None) -> float:
+    """Return the time (s) of a way (m or rad), as given or from its greatest rate."""
+    steepest = 15.0 / 8.0 if moved.course == "smooth" else 1.0  # greatest rate over its mean
+    return abs(way) / (greatest or math.nan) * steepest if moved.duration is None else moved.duration
 
 
 AnyDrive = Annotated[Harmonic | FromTable | Ramp | Rotation, Field(discriminator="kind")]

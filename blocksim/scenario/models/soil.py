@@ -20,6 +20,7 @@ Start = Literal["geostatic", "ramp"]
 Gradient = Literal["raw", "corrected"]
 MOST_PARTICLES = 1_000_000
 LEAST_ACROSS = 4
+RAMP_TIME = 0.1  # s, in which gravity grows where soil starts without stress
 SPACINGS_A_SIDE = 8  # least number of spacings across the thinnest block
 MILLI = 1e3
 SHAPES: dict[str, tuple[str, ...]] = {

@@ -10,7 +10,7 @@ from blocksim.kernels.common.systems import Stages
 from blocksim.kernels.soil import arrays, contact, step
 from blocksim.kernels.sph.functions import WENDLAND_SUPPORT
 from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments, placement
-from blocksim.scenario.models.soil import SoilTable
+from blocksim.scenario.models.soil import RAMP_TIME, SoilTable
 from blocksim.world import build, interactions
 from blocksim.world.systems import soils
 
@@ -47,7 +47,7 @@ def build_soils(scenario: Scenario) -> arrays.Soils:
     one.skin = SKIN * spacing
     one.radius = 0.5 * spacing
     one.viscosity = VISCOSITY
-    one.ramp = soils.RAMP if any(table.start == "ramp" for table in tables) else 0.0
+    one.ramp = RAMP_TIME if any(table.start == "ramp" for table in tables) else 0.0
     one.blocks = len(place_bodies(scenario))
     one.is_uniform = len(tables) == 1
     return arrays.Soils(

@@ -19,7 +19,7 @@ import numpy as np
 from blocksim.scenario import GROUND, Scenario, geometry, overrides, place_bodies, placement, resolve_pair, start
 from blocksim.scenario.models import contact, loads, timeline
 from blocksim.scenario.models.geometry import Material
-from blocksim.scenario.models.soil import SoilTable
+from blocksim.scenario.models.soil import RAMP_TIME, SoilTable
 from blocksim.world.systems import blocks, system
 
 MILLI, KILO = 1e3, 1e-3
@@ -31,7 +31,6 @@ SHEAR_RATIO = 0.8  # shear over normal stiffness of a contact
 # The most that leaves a particle between two bodies, with twice the stiffness and dashpot, no more than critical. What
 # strikes a body leaves with exp(-pi/2) = 0.21 of its speed: soil is no ball.
 DAMPING_RATIO = math.sqrt(0.5)
-RAMP = 0.1  # s, in which gravity grows
 SETTLING = 5e-3  # damping meanwhile, in (E / (rho h^2))^(1/2)
 # Stresses of a geostatic start are not quite in equilibrium: in corners between faces, along inclined ones
 # (kernels/soil/stress.py), and below slopes. For the time that a wave takes for that many smoothing lengths that shock
@@ -97,7 +96,7 @@ def damping_at_start(scenario: Scenario, table: SoilTable) -> tuple[float, float
     material = scenario.materials[table.material]
     smoothing, speed = SMOOTHING * table.spacing, wave_speed(material)
     if table.start == "ramp":
-        return SETTLING * math.sqrt(material.young_modulus / material.density) / smoothing, RAMP
+        return SETTLING * math.sqrt(material.young_modulus / material.density) / smoothing, RAMP_TIME
     return SHOCK_DAMPING * speed / smoothing, SHOCK_TIME * smoothing / speed
 
 
