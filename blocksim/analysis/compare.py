@@ -27,6 +27,7 @@ from math import cos, inf, isfinite, nan, pi, sin, sqrt, tan
 from typing import TYPE_CHECKING, Any
 
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, Statistics, quote_names
+from blocksim.analysis.outliers import READINGS
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
 from blocksim.notebook import Shown
@@ -80,7 +81,7 @@ def lower_bound(count: int, total: int, tail: float = 1.0 - CONFIDENCE) -> float
 
 
 ROTATION_TOLERANCE = 5.0  # deg, either side of the measured mean
-READING = 0.5  # mm, uncertainty of one reading of a position
+READING = READINGS["mm"]
 
 
 class Verdict(StrEnum):

@@ -13,7 +13,7 @@ the peak, the displacement at which it has fallen to 0.8 of it, and the area bel
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean, stdev
@@ -21,6 +21,7 @@ from statistics import fmean, stdev
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.analysis import outliers
 from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict
 from blocksim.analysis.experiment import CURVES
 from blocksim.errors import InvalidInputError
@@ -32,6 +33,7 @@ TIME = "time"
 STIFF = (0.15, 0.4)  # of the peak, between which the secant is
 FALLEN = 0.8  # of the peak
 LEAST_WAY = 1e-3  # of the farthest point of all curves: less is no way in a direction
+LEAST_SCATTER = 0.02  # of the mean: least standard deviation of what repeats reach
 SINGLE = 0.1  # of the mean: range of a single repeat, where no tolerance is given
 
 
@@ -115,6 +117,7 @@ class CurveTable:
     y: Axis
     curves: Mapping[str, Mapping[int, tuple[Floats, Floats]]]  # by probe and replicate
     source: str
+    warnings: tuple[str, ...] = ()  # of points and repeats that are far from the others
 
     def points(self, probe: str, x: str, y: str) -> list[tuple[Floats, Floats]]:
         """Return the curves of a probe in SI, where they are of these two quantities; else none."""
@@ -132,6 +135,7 @@ def load_curves(path: Path | str) -> CurveTable:
         input_files.raise_problems([table.header.problem(f"{message}, such as displacement_mm,force_kN")])
     axes = _axes(table)
     points: dict[str, dict[int, list[tuple[float, float]]]] = {}
+    lines: dict[tuple[str, int], list[input_files.Line]] = {}
     for row in table.rows:
         number, values = row["replicate"], []
         if not (number.text.isascii() and number.text.isdigit() and int(number.text) > 0):
@@ -144,6 +148,7 @@ def load_curves(path: Path | str) -> CurveTable:
                 table.problems.append(row[name].problem(str(error)))
         if len(values) == len(names[2:]):
             points.setdefault(row["probe"].text, {}).setdefault(int(number.text), []).append((values[0], values[1]))
+            lines.setdefault((row["probe"].text, int(number.text)), []).append(number.line)
     for probe, curves in points.items():
         for replicate, found in curves.items():
             if len(found) < 2:
@@ -157,7 +162,27 @@ def load_curves(path: Path | str) -> CurveTable:
         probe: {number: (np.array(found)[:, 0], np.array(found)[:, 1]) for number, found in curves.items()}
         for probe, curves in points.items()
     }
-    return CurveTable(axes[0], axes[1], columns, str(path))
+    return CurveTable(axes[0], axes[1], columns, str(path), tuple(_far_points(axes, columns, lines)))
+
+
+def _far_points(
+    axes: Sequence[Axis],
+    columns: Mapping[str, Mapping[int, tuple[Floats, Floats]]],
+    lines: Mapping[tuple[str, int], Sequence[input_files.Line]],
+) -> Iterator[str]:
+    """Yield a warning with its line for points unlike their neighbours, and repeats that reach elsewhere."""
+    for probe, curves in columns.items():
+        for number, axis in enumerate(axes):
+            reached = [float(np.abs(one[number]).max()) for one in curves.values()]
+            least, is_chosen = LEAST_SCATTER * fmean(reached), axis is axes[0]
+            far = dict(outliers.far_values(reached, least, axis.unit, is_chosen=is_chosen))
+            for place, (replicate, one) in enumerate(curves.items()):
+                at = lines[probe, replicate]
+                found = [(at[point], why) for point, why in outliers.spikes(one[number].tolist(), axis.unit)]
+                if not found and place in far:
+                    found = [(at[int(np.abs(one[number]).argmax())], f"the largest {axis.name}, {far[place]}")]
+                for line, why in found:
+                    yield f"{line.where}:{line.number}: probe {probe}, {axis.column}, replicate {replicate}: {why}"
 
 
 def _axes(table: input_files.CsvTable) -> list[Axis]:
@@ -181,7 +206,7 @@ def compare_curves(
     the run does not have.
     """
     rows: list[ComparisonRow] = []
-    messages: list[str] = []
+    messages = [f"warning: {text}" for text in table.warnings]
     for name, curves in table.curves.items():
         if name not in probes:
             known = spelling.did_you_mean_or_list(name, probes) if probes else "the run has no probes"

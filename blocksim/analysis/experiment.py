@@ -1,6 +1,6 @@
 """Measured tables: the repeats of a laboratory experiment, and sizes and materials of its blocks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from math import fsum, inf, isfinite, nan, pi, sqrt
@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
+from blocksim.analysis import outliers
 from blocksim.errors import InvalidInputError, Problem
 from blocksim.scenario import input_files, spelling, units
 
@@ -71,7 +72,8 @@ class ExperimentTable:
     """The measured repeats of one experiment.
 
     `measurements` stand in the file's order; rows without a value are only in `missing` (value NaN).
-    `source` is the path as it was given, `notes` the comment lines, `places` where each block is first named.
+    `source` is the path as it was given, `notes` the comment lines, `places` where each block is first named,
+    `warnings` name values that are far from the other repeats.
     """
 
     measurements: tuple[Measurement, ...]
@@ -79,6 +81,7 @@ class ExperimentTable:
     notes: tuple[str, ...] = ()
     missing: tuple[Measurement, ...] = ()
     places: Mapping[str, input_files.TableCell] = field(default_factory=dict, repr=False)
+    warnings: tuple[str, ...] = ()
 
     @property
     def data(self) -> "pd.DataFrame":
@@ -99,12 +102,13 @@ class ExperimentTable:
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """Notes for the reader of a comparison: missing values."""
+        """Notes for the reader of a comparison: values that are far from the others, and missing ones."""
+        warnings = tuple(f"warning: {text}" for text in self.warnings)
         if not self.missing:
-            return ()
+            return warnings
         first, more = self.missing[0], len(self.missing) - 1
         text = f"{self.source}: replicate {first.replicate} has no {first.quantity} of block '{first.block}'"
-        return (text + (f" (and {more} more such rows)" if more else ""),)
+        return (*warnings, text + (f" (and {more} more such rows)" if more else ""))
 
     def refuse_unknown(self, blocks: Sequence[str], whose: str) -> None:
         """Raise InvalidInputError, with every place in the file, for measured blocks that are not among `blocks`."""
@@ -197,8 +201,23 @@ def load_table(path: Path | str) -> ExperimentTable:
     if table.problems:
         input_files.raise_problems(table.problems)
     missing = tuple(one for one, _ in rows if not isfinite(one.value))
+    warnings = tuple(_far_values(rows))
     places = {row["block"].text: row["block"] for row in reversed(table.rows)}
-    return ExperimentTable(measured, str(path), table.notes, missing, places)
+    return ExperimentTable(measured, str(path), table.notes, missing, places, warnings)
+
+
+def _far_values(rows: Sequence[tuple[Measurement, dict[str, input_files.TableCell]]]) -> Iterator[str]:
+    """Yield a warning with its line for every value that is far from the other repeats."""
+    repeats: dict[tuple[str, str, str], list[tuple[Measurement, dict[str, input_files.TableCell]]]] = {}
+    for one, row in rows:
+        if isfinite(one.value):
+            repeats.setdefault((one.block, one.quantity, one.unit), []).append((one, row))
+    for (block, quantity, unit), found in repeats.items():
+        values = [one.value for one, _ in found]
+        for place, why in outliers.far_values(values, outliers.READINGS[unit], unit):
+            one, row = found[place]
+            line = row["value"].line
+            yield f"{line.where}:{line.number}: block {block}, {quantity}, replicate {one.replicate}: {why}"
 
 
 def _measurement(row: dict[str, input_files.TableCell], problems: list[Problem]) -> Measurement | None:

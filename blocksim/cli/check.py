@@ -70,7 +70,7 @@ def check_command(
     """
     with source.built() as ready:
         description = describe.describe(ready)
-    check_experiment(ready)
+    of_table = check_experiment(ready)
     if screen.as_json:
         bodies = [{**body._asdict(), "mass": body.mass, "inertia": body.inertia} for body in description.bodies]
         data = {**asdict(replace(description, bodies=())), "bodies": bodies}
@@ -81,7 +81,7 @@ def check_command(
     if description.bodies:
         tables += [_bodies(description.bodies), _pairs(ready, description.pairs), _rules(description.pairs)]
     lines = "\n\n".join("\n".join(table) for table in tables)
-    warnings = [*check.implausible_values(ready), *description.warnings]
+    warnings = [*check.implausible_values(ready), *description.warnings, *of_table]
     notes = [*(f"warning: {text}" for text in warnings), f"{ready.name}: valid"]
     return command_line.Report([] if screen.quiet else [lines], notes=notes)
 

@@ -124,7 +124,7 @@ def verdict_lines(comparison: compare.Comparison) -> list[str]:
             distance = f"less than {least:g}" if row.distance < least else output.number(row.distance, DIGITS)
             whose = "block" if row.quantity in QUANTITIES else "probe"
             outside.append(f"outside: {row.quantity} of {whose} {row.block} by {distance} {row.unit}")
-    return [*comparison.messages, *(outside or ["all inside"])]
+    return [*_wrapped(comparison.messages), *(outside or ["all inside"])]
 
 
 def _judgement_lines(judgement: metrics.Judgement) -> Iterator[str]:

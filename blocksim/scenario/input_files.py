@@ -168,9 +168,8 @@ LARGEST_FILE = 1_000_000  # bytes
 LONGEST_LINE = 1_000  # characters
 MOST_PROBLEMS_SHOWN = 20
 
-CELL = re.compile(r'[ ]*("(?:[^"]|"")*"|[^",]*)[ ]*(,|$)')
+CELLS = {sign: re.compile(rf'[ ]*("(?:[^"]|"")*"|[^"{sign}]*)[ ]*({sign}|$)') for sign in (",", ";")}
 QUOTED = re.compile(r'^"([^"]*)"$')
-DIALECT = "separate them by commas, and write decimals with a point"
 NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
@@ -197,6 +196,7 @@ class TableCell:
     line: Line
     start: int
     length: int
+    separator: str = ","
 
     def problem(self, message: str) -> Problem:
         """Locate a mistake in this cell."""
@@ -204,12 +204,23 @@ class TableCell:
 
     def number(self) -> float:
         """Return the finite number in this cell; raises ValueError with a message for the user."""
-        if not NUMBER.fullmatch(self.text):
+        text = plain_number(self.text, self.separator)
+        if not NUMBER.fullmatch(text):
             raise ValueError(f"'{self.text}' is not a number, write it as 71.69 or 7.169e1")
-        value = float(self.text)
+        value = float(text)
         if abs(value) == float("inf"):
             raise ValueError(f"'{self.text}' is too large")
         return value
+
+
+def separator_of(header: str) -> str:
+    """Return what separates the columns of a table: semicolons as of spreadsheets where decimals have a comma."""
+    return ";" if ";" in header and "," not in header else ","
+
+
+def plain_number(text: str, separator: str) -> str:
+    """Return a number with its decimal point, for which a table with semicolons may have a comma."""
+    return text.replace(",", ".") if separator == ";" and text.count(",") == 1 and "." not in text else text
 
 
 @dataclass
@@ -227,6 +238,7 @@ class CsvTable:
 def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FILE) -> CsvTable:
     """Read a table that has exactly these columns, in any order; or any, if none are given, each with a name.
 
+    Columns are separated by commas; or by semicolons, and then decimals may have a comma.
     `limit` is the largest size in bytes. Rows of the wrong shape are left out and recorded in `problems`, and so are
     misspelt columns. Raises InputMissingError when the file cannot be read and InvalidInputError when it is not a text
     file or its header is wrong.
@@ -236,11 +248,10 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
     needed = f"its first line must be {','.join(columns)}"
     if not content:
         raise_problems([Problem(str(path), "the table is empty" + (f", {needed}" if columns else ""))])
-    line, places = content[0], _cells(content[0])
-    if ";" in line.text and "," not in line.text:  # as in spreadsheets' tables where decimals have a comma
-        raise_problems([line.problem(f"columns are separated by semicolons; {DIALECT}")])
+    line, separator = content[0], separator_of(content[0].text)
+    places = _cells(line, separator)
     if places is None:
-        raise_problems([line.problem(_shape_complaint(line, places, 0))])
+        raise_problems([line.problem(_shape_complaint(line, places, 0, separator))])
     heads = tuple(TableCell(place[0] if columns else "", *place) for place in places)
     names = [head.text for head in heads]
     problems = []
@@ -261,12 +272,13 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
     notes = tuple(line.text.strip()[1:].strip() for line in lines if line.text.lstrip().startswith("#"))
     table = CsvTable(str(path), notes, line, heads, problems=problems)
     for row in content[1:]:
-        cells = _cells(row)
-        complaint = _shape_complaint(row, cells, len(names))
+        cells = _cells(row, separator)
+        complaint = _shape_complaint(row, cells, len(names), separator)
         if complaint or cells is None:
             table.problems.append(row.problem(complaint))
         else:
-            table.rows.append({name: TableCell(name, *place) for name, place in zip(meant, cells, strict=True)})
+            named = zip(meant, cells, strict=True)
+            table.rows.append({name: TableCell(name, *place, separator) for name, place in named})
     return table
 
 
@@ -303,12 +315,12 @@ def numbered_lines(text: str) -> Iterator[tuple[int, str]]:
     return enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)
 
 
-def _cells(line: Line) -> list[tuple[str, Line, int, int]] | None:
-    """Split a line at its commas; None when its quotes do not match."""
+def _cells(line: Line, separator: str) -> list[tuple[str, Line, int, int]] | None:
+    """Split a line into its cells; None when its quotes do not match."""
     cells = []
     position = 0
     while len(line.text) <= LONGEST_LINE:
-        match = CELL.match(line.text, position)
+        match = CELLS[separator].match(line.text, position)
         if match is None:
             return None
         content = match[1].strip()
@@ -320,11 +332,11 @@ def _cells(line: Line) -> list[tuple[str, Line, int, int]] | None:
     return None
 
 
-def _shape_complaint(line: Line, cells: list[tuple[str, Line, int, int]] | None, count: int) -> str:
+def _shape_complaint(line: Line, cells: list[tuple[str, Line, int, int]] | None, count: int, separator: str) -> str:
     """Return the error in the shape of a row, or nothing."""
     if len(line.text) > LONGEST_LINE:
         return f"the line has {len(line.text)} characters, at most {LONGEST_LINE} are read"
     if cells is None:
         return "quotes do not match"
-    hint = " (decimals are written with a point)" if len(cells) > count else ""
+    hint = " (decimals with a comma need semicolons between columns)" if len(cells) > count and separator == "," else ""
     return f"{len(cells)} cells where the header has {count} columns{hint}" if len(cells) != count else ""

@@ -206,7 +206,7 @@ class Fit(UnstoredResult):
 
     @property
     def remarks(self) -> list[str]:
-        """Values at a bound of their prior, failures, and where the scenario is."""
+        """Measured values far from others, values at a bound of their prior, failures, and where the scenario is."""
         values = [(prior, self.best.values[prior.key]) for prior in self.plan.priors]
         lines = [
             f"warning: {prior.key} = {value} lies at a bound of its prior; a wider one might fit better"
@@ -217,7 +217,7 @@ class Fit(UnstoredResult):
         if failed:
             count = f"{failed} of {self.score.members} fresh samples"
             lines.append(f"{count} failed or cannot be simulated; they count as outside")
-        return [*lines, f"written: {self.path}"]
+        return [*self.plan.table.messages, *lines, f"written: {self.path}"]
 
     def overview(self) -> Overview:
         """Return the fitted values and, where trials tie, the ranges of those that are equally good."""

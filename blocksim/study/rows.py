@@ -196,17 +196,22 @@ class Ranges:
         return ((values >= lower) & (values <= upper)).all(axis=1)
 
 
-def check_experiment(scenario: Scenario) -> None:
-    """Check that the table that a scenario names goes with the blocks: better now than after the run."""
+def check_experiment(scenario: Scenario) -> tuple[str, ...]:
+    """Check that the table that a scenario names goes with the blocks: better now than after the run.
+
+    Returns warnings of measured values that are far from the others.
+    """
     if scenario.experiment is None:
-        return
+        return ()
     if experiment.has_curves(scenario.experiment.table):
         table, known = curves.load_curves(scenario.experiment.table), events.probes_of(scenario)
         for name in table.curves:
             if name not in known:
                 hint = spelling.did_you_mean_or_list(name, known) if known else "the scenario has no probes"
                 raise InvalidInputError(f"{table.source}: unknown probe '{name}', {hint}")
-        return
+        return table.warnings
     names = [body.name for body in place_bodies(scenario)]
     unknown = dict.fromkeys(COLUMNS[1:], [0.0] * len(names))
-    compare.compare_final({"block": names, **unknown}, experiment.load_table(scenario.experiment.table))
+    measured = experiment.load_table(scenario.experiment.table)
+    compare.compare_final({"block": names, **unknown}, measured)
+    return measured.warnings

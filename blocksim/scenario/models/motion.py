@@ -142,25 +142,28 @@ def read_series(
     except UnicodeDecodeError:
         raise MotionTableError("not a text file in UTF-8") from None
     kept = (one for one in input_files.numbered_lines(text) if one[1].strip() and not one[1].lstrip().startswith("#"))
-    lines = [(number, [input_files.QUOTED.sub(r"\1", cell.strip()) for cell in row.split(",")]) for number, row in kept]
+    rows = list(kept)
+    separator = input_files.separator_of(rows[0][1]) if rows else ","
+    lines = [
+        (number, [input_files.QUOTED.sub(r"\1", cell.strip()) for cell in row.split(separator)]) for number, row in rows
+    ]
     line, names = lines[0] if lines else (1, [])
     others = [name for name in names if name != TIME]
     if len(names) != 2 or len(others) != 1 or others[0] not in columns:
         found = q.toml(",".join(names))
-        message = f"the columns are {found}; {needed} are needed"
-        if ";" in found:
-            message = f"{found}: columns are separated by semicolons; {input_files.DIALECT}"
-        raise MotionTableError(f"line {line}: {message}")
+        raise MotionTableError(f"line {line}: the columns are {found}; {needed} are needed")
     times: list[float] = []
     values: list[float] = []
     for line, cells in lines[1:]:
         if len(cells) != 2:
-            hint = f"; {input_files.DIALECT}" if len(cells) > 2 or any(";" in cell for cell in cells) else ""
+            is_unclear = separator == "," and (len(cells) > 2 or any(";" in cell for cell in cells))
+            hint = "; decimals with a comma need semicolons between columns" if is_unclear else ""
             raise MotionTableError(f"line {line}: {q.toml(','.join(cells))}: a time and a value are needed{hint}")
         empty = next((name for name, cell in zip(names, cells, strict=True) if not cell), "")
         if empty:
             raise MotionTableError(f"line {line}: the {empty} is missing")
-        numbers = dict(zip(names, (finite_number(line, cell, cell) for cell in cells), strict=True))
+        plain = [finite_number(line, cell, input_files.plain_number(cell, separator)) for cell in cells]
+        numbers = dict(zip(names, plain, strict=True))
         time, before = numbers[TIME], times[-1] if times else -math.inf
         if time < 0.0 or time <= before:
             why = "times must not be negative" if time < 0.0 else f"times must increase, the one before is {before:g} s"
@@ -412,12 +415,14 @@ def _two_columns(lines: Sequence[Line]) -> tuple[str, Iterable[float], list[floa
     said, is_named = _second_name(kept[0]) if kept else ("", False)
     rows = []
     for number, text in kept[is_named:]:
-        cells = re.findall(r"[^,;\s]+", text)
-        if len(cells) != 2:  # as in 0,01;0,12 or 0,01,0,12, whose numbers have a comma where a point belongs
+        cells = [input_files.plain_number(cell.strip(), ";") for cell in text.strip(" \t;").split(";")]
+        if len(cells) != 2:  # not separated by semicolons, with which numbers may have decimal commas
+            cells = re.findall(r"[^,;\s]+", text)
+        if len(cells) != 2:  # as in 0,01 0,12 or 0,01,0,12
             by_others = re.findall(r"[^;\s]+", text)
             is_pair = len(by_others) == 2 and 0 < text.count(",") <= 2
             has_commas = is_pair or (len(by_others) == 1 and text.count(",") == 1 + 2)
-            hint = "; decimals are written with a point" if has_commas else ""
+            hint = "; decimals with a comma need semicolons between columns" if has_commas else ""
             why = f"a time and an acceleration are needed{hint}"
             raise MotionTableError(f"line {number}: {q.toml(text.strip())}: {why}")
         rows.append((number, _number(number, cells[0]), _number(number, cells[1])))
