@@ -169,6 +169,7 @@ LONGEST_LINE = 1_000  # characters
 MOST_PROBLEMS_SHOWN = 20
 
 CELLS = {sign: re.compile(rf'[ ]*("(?:[^"]|"")*"|[^"{sign}]*)[ ]*({sign}|$)') for sign in (",", ";")}
+EMPTY = "the table is empty"
 QUOTED = re.compile(r'^"([^"]*)"$')
 NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
@@ -247,7 +248,7 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
     content = [line for line in lines if line.text.strip() and not line.text.lstrip().startswith("#")]
     needed = f"its first line must be {','.join(columns)}"
     if not content:
-        raise_problems([Problem(str(path), "the table is empty" + (f", {needed}" if columns else ""))])
+        raise_problems([Problem(str(path), EMPTY + (f", {needed}" if columns else ""))])
     line, separator = content[0], separator_of(content[0].text)
     places = _cells(line, separator)
     if places is None:

@@ -11,7 +11,7 @@ from blocksim.analysis.experiment import has_curves, load_table
 from blocksim.analysis.metrics import Judgement, Settings, judge
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.options import Option
-from blocksim.scenario import load_scenario, load_stored
+from blocksim.scenario import Scenario, load_scenario, load_stored
 from blocksim.simulation import Result, files, results
 from blocksim.study import manifest, rows, run_folder, sweep_folder
 
@@ -99,9 +99,10 @@ def compare_run(
     """
     final: Columns | pd.DataFrame
     drawn: Result | Path | None = None
+    was: Scenario | None = None
     if isinstance(run, Result):
         name, summary, final, named = run.name, run.summary, run.columns, run.experiment
-        drawn = run
+        drawn, was = run, run.scenario
     elif not isinstance(run, Path | str):
         name, summary, final, named = "", None, run, None
     else:
@@ -118,6 +119,8 @@ def compare_run(
     table = experiment or named
     if table is None:
         raise InputMissingError("the scenario names no experiment; give a table with --experiment")
+    if was is not None:
+        rows.check_experiment(was, table)
     probes: Mapping[str, ProbeSeries] | None = None
     if drawn is not None and has_curves(table):
         result = drawn if isinstance(drawn, Result) else results.read_result(drawn)

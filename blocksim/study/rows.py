@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 from blocksim.analysis import compare, curves, experiment
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.scenario import Scenario, Sweep, events, place_bodies, spelling, units
+from blocksim.scenario import Scenario, Sweep, events, input_files, place_bodies, spelling, units
+from blocksim.simulation import instruments
 from blocksim.simulation.trajectory import COLUMNS, Columns
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ HEAD = re.compile(r"(?P<key>.*?) \[(?P<unit>[^\[\]]+)\]")
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 MARK = "'"  # spreadsheets show what follows as text
 NUMBERS = "if"  # kinds of numpy
+LEAST_COMMON = 2  # columns that a table of final positions has at least, misspelt ones aside
 
 
 def row_of(end: "Outcome | Summary", seconds: float, observed: Mapping[str, object], final: Columns) -> Row:
@@ -196,22 +198,71 @@ class Ranges:
         return ((values >= lower) & (values <= upper)).all(axis=1)
 
 
-def check_experiment(scenario: Scenario) -> tuple[str, ...]:
-    """Check that the table that a scenario names goes with the blocks: better now than after the run.
+CURVES_OF = {
+    instruments.ACTUATOR: "displacement_mm,force_kN",
+    instruments.POINT: "time_s,dx_mm",
+    instruments.FORCE: "time_s,fx_N",
+    instruments.JOINT: "time_s,opening_mm",
+}
+"""Two quantities of each kind of probe with their units, as examples."""
+
+
+def check_experiment(scenario: Scenario, path: Path | str | None = None) -> tuple[str, ...]:
+    """Check that a table, or that which a scenario names, goes with the blocks: better now than after the run.
 
     Returns warnings of measured values that are far from the others.
     """
-    if scenario.experiment is None:
+    path = path or (scenario.experiment.table if scenario.experiment else None)
+    if path is None:
         return ()
-    if experiment.has_curves(scenario.experiment.table):
-        table, known = curves.load_curves(scenario.experiment.table), events.probes_of(scenario)
+    _refuse_other_columns(scenario, Path(path))
+    if experiment.has_curves(path):
+        table, known = curves.load_curves(path), events.probes_of(scenario)
         for name in table.curves:
             if name not in known:
-                hint = spelling.did_you_mean_or_list(name, known) if known else "the scenario has no probes"
+                hint = spelling.did_you_mean_or_list(name, known) if known else f"use {_headers(scenario)}"
                 raise InvalidInputError(f"{table.source}: unknown probe '{name}', {hint}")
+            _refuse_other_quantities(table, name, known[name].kind)
         return table.warnings
     names = [body.name for body in place_bodies(scenario)]
     unknown = dict.fromkeys(COLUMNS[1:], [0.0] * len(names))
-    measured = experiment.load_table(scenario.experiment.table)
+    measured = experiment.load_table(path)
     compare.compare_final({"block": names, **unknown}, measured)
     return measured.warnings
+
+
+def _refuse_other_columns(scenario: Scenario, path: Path) -> None:
+    """Refuse a table that has neither final positions nor curves, with the columns that this scenario takes."""
+    try:
+        table = input_files.read_table(path)
+    except InvalidInputError as error:  # whatever reads it says what is wrong in it
+        if not str(error).endswith(input_files.EMPTY):
+            return
+        raise InvalidInputError(f"{error}; its first line is {_headers(scenario)}") from None
+    names = tuple(head.text for head in table.heads)
+    is_curve = names[: len(curves.FIRST)] == curves.FIRST and len(names) == len(curves.FIRST) + 2
+    if not is_curve and len({*names} & {*experiment.COLUMNS}) < LEAST_COMMON:
+        input_files.raise_problems([table.header.problem(f"these columns are not known; use {_headers(scenario)}")])
+
+
+def _headers(scenario: Scenario) -> str:
+    """Return the first lines that a measured table of a scenario may have: of its probes, and of final positions."""
+    named = {probe.kind: name for name, probe in reversed(events.probes_of(scenario).items())}
+    texts = []
+    for kind, columns in CURVES_OF.items():
+        if kind in named:
+            template = "experiment-curve" if kind == instruments.ACTUATOR else "experiment-response"
+            texts.append(f"{','.join(curves.FIRST)},{columns} ({kind} '{named[kind]}': blocksim new {template} NAME)")
+    return " or ".join([*texts, f"{','.join(experiment.COLUMNS)} (final positions: blocksim new experiment NAME)"])
+
+
+def _refuse_other_quantities(table: curves.CurveTable, name: str, kind: str) -> None:
+    """Refuse quantities that a probe does not record, and units of other kinds."""
+    known = {curves.TIME: "s", **instruments.COLUMNS.get(kind, {})}
+    for axis in (table.x, table.y) if kind in instruments.COLUMNS else ():
+        if axis.name not in known:
+            hint = spelling.did_you_mean_or_list(axis.name, known, "it has")
+            raise InvalidInputError(f"{table.source}: probe '{name}' records no {axis.name}, {hint}")
+        if known[axis.name] != "1" and units.unit_factor(axis.unit, known[axis.name]) is None:
+            what = f"{axis.unit} is not a unit of the {axis.name} of probe '{name}', which is in {known[axis.name]}"
+            raise InvalidInputError(f"{table.source}: {axis.column}: {what}")
