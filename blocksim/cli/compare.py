@@ -15,7 +15,7 @@ from blocksim.scenario.input_files import relative_path
 from blocksim.study import manifest, run_folder
 from blocksim.study.compare import ExperimentTablePath, compare_run, compare_sweep
 
-COLUMNS = ("block", "quantity", "simulated", "mean ± s", "[min, max]", "error", "verdict")
+COLUMNS = ("block", "quantity", "simulated", "mean ± s", "range", "error", "verdict")
 DIGITS = 2
 SIGNS = {"deg": "°"}
 MOST_ROWS = 40  # of one table
@@ -103,7 +103,7 @@ def comparison_table(comparison: compare.Comparison) -> list[str]:
                 f"{row.quantity} {SIGNS.get(row.unit, row.unit)}",
                 output.number(row.simulated, digits),
                 f"{output.number(row.mean, digits)} ± {output.number(row.s, digits)}",
-                f"[{output.number(row.minimum, digits)}, {output.number(row.maximum, digits)}]",
+                _range(row, digits),
                 output.number(row.error, digits),
                 str(row.verdict),
             )
@@ -113,6 +113,19 @@ def comparison_table(comparison: compare.Comparison) -> list[str]:
 
     tables, width = (table(digits) for digits in (DIGITS, DIGITS - 1)), output.width_of_screen()
     return min(tables, key=lambda lines: (max(map(len, lines)) > width, any("…" in line for line in lines)))
+
+
+def _range(row: compare.ComparisonRow, digits: int) -> str:
+    """Return the measured range of a row, and the tolerance on both sides of it that decided."""
+    ends = [output.number(end, digits) for end in (row.minimum, row.maximum)]
+    text = ends[0] if row.minimum == row.maximum else f"[{', '.join(ends)}]"
+    if row.quantity == "rotation":
+        return f"{output.number(row.mean, digits)} ± {compare.ROTATION_TOLERANCE:g}"
+    tolerance = row.minimum - row.lower
+    if not tolerance > 0.0:  # NaN: no limits
+        return text
+    share = "" if row.quantity in QUANTITIES else f"{PERCENT * tolerance / abs(row.mean):.3g} %"
+    return f"{text} ± {share or f'{tolerance:g}'}"
 
 
 def verdict_lines(comparison: compare.Comparison) -> list[str]:
