@@ -83,6 +83,8 @@ def compare_sweep(
             f"mode {sweep_of.mode!r} sets its members: shares are counts, not probabilities",
             "the 95 % limits hold for samples only (modes lhs, sobol, normal)",
         )
+    if result.missing:
+        remarks = (f"{result.progress} cases have run; rerun the sweep to finish", *remarks)
     return judge(members, load_table(table), settings, remarks)
 
 

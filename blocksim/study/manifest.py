@@ -10,7 +10,7 @@ import os
 import re
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -19,11 +19,12 @@ from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
-from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
+from blocksim.errors import BlocksimError, InvalidInputError, OutputError, OutputExistsError
 from blocksim.notebook import Shown
+from blocksim.scenario import load_stored
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, refuse_large
 from blocksim.simulation import files, observables, provenance
-from blocksim.study import plan, rows
+from blocksim.study import plan, rows, sweep_folder
 from blocksim.study.executors import Batch
 
 if TYPE_CHECKING:
@@ -286,16 +287,18 @@ class SweepResult(Shown):
             raise InvalidInputError(f"{path}: {NO_TABLE}: {str(error).strip()}") from error
         if not set(table.columns) >= NEEDED or table.columns[0] != "case":
             raise InvalidInputError(f"{path}: {NO_TABLE}: {NO_COLUMNS}")
+        if self.planned is not None:
+            table.attrs |= {"planned": self.planned, "missing": self.planned - len(table)}
         return table
 
     def to_frame(self) -> "pd.DataFrame":
-        """Return the table, one row per case."""
+        """Return the table, one row per case; its `attrs` have how many are planned and missing."""
         return self.table
 
     def __repr__(self) -> str:
         """Return a line: folder, cases and what varies."""
         failed = f", {self.failed} failed" if self.failed else ""
-        return f"<SweepResult {self.folder}: {len(self.table)} cases{failed}; varied: {', '.join(self.keys)}>"
+        return f"<SweepResult {self.folder}: {self.progress} cases{failed}; varied: {', '.join(self.keys)}>"
 
     def _repr_html_(self) -> str:
         """Return the same line above the table and the picture that suits it, for notebooks."""
@@ -315,8 +318,13 @@ class SweepResult(Shown):
 
     @property
     def missing(self) -> int:
-        """How many cases were not run, where the first failure was to end the sweep."""
+        """How many cases were not run, as the sweep was interrupted or the first failure was to end it."""
         return 0 if self.planned is None else self.planned - len(self.table)
+
+    @property
+    def progress(self) -> str:
+        """How many cases there are, and of how many that are planned where some are missing."""
+        return f"{len(self.table)} of {self.planned}" if self.missing else str(len(self.table))
 
     @property
     def share_inside(self) -> float | None:
@@ -338,9 +346,17 @@ def is_sweep(place: Path | str) -> bool:
 
 def read_sweep(folder: Path | str) -> SweepResult:
     """Return the sweep that a folder holds. Raises InputMissingError or InvalidInputError."""
-    result = SweepResult(Path(folder))
+    result = SweepResult(Path(folder), planned=planned_in(Path(folder)))
     _ = result.table
     return result
+
+
+def planned_in(folder: Path) -> int | None:
+    """Return how many cases the plan in a folder has; None where no plan is there that this version reads."""
+    with suppress(BlocksimError):
+        sweep = load_stored(folder / sweep_folder.PLAN).sweep
+        return None if sweep is None else plan.count_of(sweep)
+    return None
 
 
 def lines_in(path: Path, most_bytes: int = MOST_BYTES) -> list[list[str]]:

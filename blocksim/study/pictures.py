@@ -48,7 +48,8 @@ def read_sweep_data(folder: Path, experiment: Path | str | None = None) -> Sweep
     Raises InputMissingError or InvalidInputError: where files are missing or damaged, no case has finished, or the
     table measures what the sweep does not have.
     """
-    table = manifest.read_sweep(folder).table
+    sweep = manifest.read_sweep(folder)
+    table = sweep.table
     scenario = load_stored(folder / sweep_folder.PLAN)
     blocks = tuple(name.removesuffix(X) for name in map(str, table.columns) if name.endswith(X))
     finished = (table["status"] == FINISHED).to_numpy(dtype=bool)
@@ -73,7 +74,7 @@ def read_sweep_data(folder: Path, experiment: Path | str | None = None) -> Sweep
         raise InvalidInputError(f"{message}; table and plan do not belong together")
     inputs = [_input(scenario, head, table[str(head)], vary[head.key]) for head in heads]
     return SweepData(
-        title=scenario.description or scenario.name,
+        title=f"{sweep.progress} cases: " * bool(sweep.missing) + (scenario.description or scenario.name),
         mode="" if scenario.sweep is None else scenario.sweep.mode,
         inputs=tuple([one for one in inputs if one.count > 1] or inputs[:1]),
         blocks=blocks,

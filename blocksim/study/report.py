@@ -136,6 +136,7 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
     if not set(columns) >= manifest.NEEDED:
         raise InvalidInputError(f"{path}: {manifest.NO_TABLE}: {manifest.NO_COLUMNS}")
     table = parts.CaseTable(place, tuple(columns), tuple(tuple(row) for row in lines if len(row) == len(columns)))
+    planned = manifest.planned_in(place) or len(table.rows)
     problems: list[str] = []
     scenario, judged, drawings = None, None, []
     try:
@@ -164,7 +165,7 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
     found = [(case, parts.read_folder(folder)) for case, folder in list(cases.items())[:most]]
     keys = {case: f"{key}-member-{number}" for number, (case, _) in enumerate(found, start=1)}
     subject = parts.sweep_subject(
-        key, table, scenario, keys, problems, list(cases)[most:], judged=judged, pictures=drawings
+        key, table, scenario, keys, problems, list(cases)[most:], planned=planned, judged=judged, pictures=drawings
     )
     shown = [
         parts.run_subject(

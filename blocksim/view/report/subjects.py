@@ -383,13 +383,14 @@ def sweep_subject(
     problems: Sequence[str] = (),
     left_out: Sequence[str] = (),
     *,
+    planned: int = 0,
     judged: Mapping[str, Any] | None = None,
     pictures: Sequence[Mapping[str, Any]] = (),
 ) -> Subject:
     """Return a sweep for a report; `members` are the keys of the subjects of its cases.
 
-    `left_out` are cases with frames that are not in the page. `judged` is what `Judgement.to_dict` gives,
-    `pictures` what `pictures_of` does.
+    `left_out` are cases with frames that are not in the page, `planned` how many cases there are to be. `judged` is
+    what `Judgement.to_dict` gives, `pictures` what `pictures_of` does.
     """
     name = table.folder.name if scenario is None else scenario.name
     inside = [value for value in table.column("inside") if value]
@@ -405,7 +406,7 @@ def sweep_subject(
         "place": local_path(str(table.folder)),
         "description": None if scenario is None else scenario.description,
         "summary": [
-            ("cases", str(len(table.rows))),
+            ("cases", f"{len(table.rows)} of {planned}" if planned > len(table.rows) else str(len(table.rows))),
             ("finished", f"{table.column(STATUS).count('finished')} of {len(table.rows)}"),
             *([("inside all measured ranges", f"{inside.count('True')} of {len(inside)}")] if inside else []),
             ("varied", ", ".join(table.keys) or "nothing"),
