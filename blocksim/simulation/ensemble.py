@@ -15,7 +15,7 @@ from blocksim.kernels.common import arrays, compiler, systems
 from blocksim.kernels.common.members import Watched, next_frame
 from blocksim.scenario import PlacedBody, Scenario, motion as motions, placement
 from blocksim.simulation import balance, instruments, loop, observables, rest_state, schemes, trajectory
-from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
+from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, OUTCOME, Value, Watch, observe
 from blocksim.world import build
 from blocksim.world.systems import blocks, system
 
@@ -108,9 +108,12 @@ def member_ends(
         if code == arrays.PAIRS_FULL:
             continue
         some, ledger = slice(m, m + 1), balance.ledger_of(names, measured[m], starts[m], *in_play)
-        outcome = loop.outcome_of(code, ledger)
+        outcome, observed = loop.outcome_of(code, ledger), observables[m]
         if outcome.status != "finished":
             outcome = loop.diagnose(outcome, code, build.member(scenes, m), placed[m])
+            outcome = loop.after_a_fall(outcome, code, ledger, observed.get(OUTCOME))
+        if outcome.status == "failed" and observed:
+            observed[OUTCOME] = None
         ends[m] = MemberEnd(
             outcome=outcome,
             ledger=ledger,
@@ -119,7 +122,7 @@ def member_ends(
             placed=placed[m],
             time_step=time_steps[m],
             rows=instruments.FrameRows(steps[m], (motion[some],), measured[some], names),
-            observables=observables[m],
+            observables=observed,
             convergence=schemes.scheme_of(scenes).convergence(build.member(scenes, m)),
         )
     return ends

@@ -19,7 +19,7 @@ from blocksim.kernels.common import arrays
 from blocksim.kernels.common.loads import value_at
 from blocksim.scenario import PlacedBody, Scenario, events, open_faces
 from blocksim.scenario.models.timeline import Event
-from blocksim.simulation import balance, checkpoint, instruments, results, schemes
+from blocksim.simulation import balance, checkpoint, instruments, observables, results, schemes
 
 NEVER = np.iinfo(np.int64).max
 NO_SIZE = -1e12  # m: half sides of what is not there: farther than that from everything
@@ -288,7 +288,7 @@ UNCONTROLLED = RunControl()
 class LoopResult:
     """The scene at the end, why it ended, where the energy went, the seconds spent in compiled code and its threads.
 
-    `overlap` (m) is the largest one of all contacts at the end.
+    `overlap` (m) is the largest one of all contacts at the end, `code` the status of the scene.
     """
 
     scene: schemes.AnyScene
@@ -297,6 +297,7 @@ class LoopResult:
     solver_seconds: float
     threads: int
     overlap: float
+    code: int
     events: tuple[results.EventRecord, ...] = ()
     pending: tuple[int, ...] = ()  # numbers of events that have not happened
 
@@ -310,6 +311,19 @@ def outcome_of(code: int, ledger: balance.EnergyLedger) -> Outcome:
     """Return what a run came to that was not interrupted: its status code, and whether its energy adds up."""
     outcome = BY_CODE[code]
     return RESIDUAL if outcome.status == "finished" and not balance.adds_up(ledger) else outcome
+
+
+STOPPED = "stopped: overlap"
+
+
+def after_a_fall(outcome: Outcome, code: int, ledger: balance.EnergyLedger, response: object) -> Outcome:
+    """Return what a run came to that an overlap has ended after the structure had fallen, as one that fell.
+
+    Where its energy does not add up, nothing is known: what broke its contacts may have flung the blocks.
+    """
+    if code != arrays.OVERLAP_LIMIT or response != observables.Response.FELL or not balance.adds_up(ledger):
+        return outcome
+    return Outcome("finished", f"fell ({STOPPED}): {outcome.reason}", ExitCode.SUCCESS)
 
 
 def run_loop(
@@ -339,7 +353,7 @@ def run_loop(
     outcome = diagnose(outcome, run.status, run.scene, recorder.placed)
     overlap, timeline = float(schemes.measure_row(run.scene)[-1]), control.timeline
     records, pending = ((), ()) if timeline is None else (timeline.records, tuple(timeline.pending))
-    return LoopResult(run.scene, outcome, ledger, run.seconds, team.threads, overlap, records, pending)
+    return LoopResult(run.scene, outcome, ledger, run.seconds, team.threads, overlap, run.status, records, pending)
 
 
 def steps_of_call(before: int, steps: int, seconds: float) -> int:

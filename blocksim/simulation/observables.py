@@ -16,7 +16,8 @@ shortest side. A scene
 
 All of this is relative to the support: what rides on a shaking table has not moved. Fixed and driven blocks do not
 count; a removed one stays where it was then. A run that `time.end` cuts short is reported as it is then; it moves on
-where some block, as fast as it is then, would be farther than that hundredth away within another tenth of the time. The
+where some block, as fast as it is then, would be farther than that hundredth away within another tenth of the time. A
+run that failed has no outcome; one that an overlap has ended after the fall fell, if its energy adds up until then. The
 first mover is the block that has moved in the first frame in which any has (the farthest of several); members of
 ensembles keep no frames, but are looked at when those would be recorded, until one block has moved.
 """
@@ -386,6 +387,10 @@ class Movement(BaseModel, frozen=True, extra="allow"):
         (values,) = observe(ends, [one.name for one in OBSERVABLES.values() if one.in_runs])
         return cls(**values) if values else None
 
+    def without_outcome(self) -> "Movement":
+        """Return those of a run that failed: what it would have come to is not known."""
+        return type(self)(**{**self.values, OUTCOME: None})
+
     @property
     def values(self) -> dict[str, Value]:
         """All by name."""
@@ -399,7 +404,7 @@ class Movement(BaseModel, frozen=True, extra="allow"):
 
     def lines(self, number: Callable[[float], str]) -> Iterator[tuple[str, str]]:
         """Yield titles and texts of what people want to know, with units and blocks."""
-        yield OUTCOME, str(self.values[OUTCOME])
+        yield OUTCOME, str(self.values[OUTCOME] or "no outcome")
         for one in OBSERVABLES.values():
             value = self.values.get(one.name)
             if one.title and value is not None:

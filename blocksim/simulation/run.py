@@ -239,8 +239,16 @@ def _result(
     settled: results.RestState | None,
 ) -> results.Result:
     frames = recorder.frames()
-    world, outcome, step = ended.scene.world, ended.outcome, recorder.time_step
+    world, step = ended.scene.world, recorder.time_step
     steps, ground = int(world.clock[0].steps), world.bodies[-1]
+    movement = observables.Movement.of(
+        recorder.watch, recorder.held[-1].states[0], (ground.vx, ground.vy), steps * step
+    )
+    if movement is not None:
+        outcome = loop.after_a_fall(ended.outcome, ended.code, ended.ledger, movement.values[observables.OUTCOME])
+        ended = replace(ended, outcome=outcome)
+        movement = movement if outcome.status != "failed" else movement.without_outcome()
+    outcome = ended.outcome
     summary = results.Summary(
         name=scenario.name,
         status=outcome.status,
@@ -264,9 +272,7 @@ def _result(
         threads=ended.threads,
         settled=settled,
         events=ended.events,
-        movement=observables.Movement.of(
-            recorder.watch, recorder.held[-1].states[0], (ground.vx, ground.vy), steps * step
-        ),
+        movement=movement,
         warnings=tuple(_warnings(scenario, recorder.placed, ended, settled)),
         environment=provenance.environment(),
     )
@@ -305,6 +311,8 @@ def _warnings(
     if residual > balance.RESIDUAL_PROMISE:
         yield f"relative energy error {residual:.1e}, above {balance.RESIDUAL_PROMISE:g}"
     yield from after_end.cut_off(scenario)
+    if loop.STOPPED in ended.outcome.reason:
+        yield f"{ended.outcome.reason}: blocks have not ended where the final table has them"
     if every < (1.0 - memory.ROUNDING) * float(ended.scene.world.controls[0].step):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     yield from _convergence_warnings(scenario, convergence_of(ended.scene))

@@ -335,8 +335,16 @@ class LimitAnswer(RangeAnswer, frozen=True):
             lines=lines,
             notes=notes,
             summary=[*about.items(), *(("limit", line) for line in found)],
-            code=ExitCode.SUCCESS if self.brackets else ExitCode.OUTSIDE,
+            code=self.code,
         )
+
+    @property
+    def code(self) -> ExitCode:
+        """Success where something changes; failures where these are all that is known besides one verdict."""
+        has_failed = any(row[1] == Stability.FAILED for row in self.cells)
+        if has_failed and not self.falls:
+            return ExitCode.SWEEP_HAS_FAILURES
+        return ExitCode.SUCCESS if self.brackets else ExitCode.OUTSIDE
 
     def _statics(self) -> Iterator[str]:
         """Yield the bound by statics, where the search began there, and whether runs stand beyond it."""
@@ -458,14 +466,13 @@ class CurveAnswer(Answer, frozen=True):
             ends = ("–" if end is None else f"{end:.7g}" for end in (low, high))
             rows.append([with_unit(over, self.over_unit, 6), *ends, *map(str, verdicts)])
         warnings = [text for point in self.points for text in point.search.warnings()]
-        is_whole = all(point.search.brackets for point in self.points)
         return Overview(
             f'{self.key} over {self.over}: stands means "{self.stands}"',
             (self.over, f"from {self.unit}".rstrip(), f"to {self.unit}".rstrip(), "below", "above"),
             rows,
             notes=[*warnings, f"limits: {self.folder / 'limits.csv'}; picture: blocksim plot {self.folder}"],
             summary=[("key", self.key), ("over", self.over), ("stands means", self.stands)],
-            code=ExitCode.SUCCESS if is_whole else ExitCode.OUTSIDE,
+            code=max(point.search.code for point in self.points),
         )
 
     def draw(self, path: Path, title: str, paper: style.Paper) -> None:
