@@ -27,8 +27,10 @@ def calibrate_command(
 
     Example: blocksim calibrate mine.toml --fit contact.restitution=0.2:0.35
     """
+    document = source.document()
+    prepare.warn_of_values([document.without_sweep().build()], screen)
     found = calibrate.calibrate(
-        source.document(),
+        document,
         replace(
             options,
             on_start=partial(prepare.announce_compilation, quiet=screen.silent),

@@ -72,11 +72,14 @@ def _shortage(error: BaseException | None) -> str:
     return ""
 
 
-def _tell_trouble(error: OSError) -> ExitCode:
+READER_GONE = 128 + 13  # of a shell for whatever a closed pipe ends (SIGPIPE)
+
+
+def _tell_trouble(error: OSError) -> int:
     """Report an input or output error; raise it again where the user did not cause it."""
     if isinstance(error, BrokenPipeError):  # the reader of our answer has gone: nothing to report
         output.abandon(sys.stdout)
-        return ExitCode.INPUT_OUTPUT
+        return READER_GONE
     if error.errno in PATH_TROUBLE and error.filename is not None:
         name = "".join(c if c.isprintable() else "\ufffd" for c in str(error.filename))
         name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}…"

@@ -50,6 +50,7 @@ def converge_command(
 
     paper = page.paper
     with source.built() as ready:
+        prepare.warn_of_values([ready], screen)
         path = out or files.RESULTS / ready.name / "converge.png"
         style.picture_path(path)
         if picture:

@@ -13,7 +13,12 @@ from blocksim.options import Option
 from blocksim.scenario.models.timeline import SPRINGS
 from blocksim.simulation.schemes import kernels_of
 from blocksim.study import answer, criterion, fragility, limit, limit_answer, limit_plan, rows
+from blocksim.study.plan import estimate_of
 
+ONE_CHANGE = (
+    "for one change in the middle of the range, which nothing foretells; each further\n"
+    "change is narrowed too, and stiffer springs or half the time step take some runs"
+)
 AT_ONCE = (
     "start.settle = false: loads that are applied suddenly shift limits of arches and walls by 0.2 to 4 %; leave it "
     "out, and every run begins at rest"
@@ -29,6 +34,7 @@ def limit_command(
     static: Annotated[
         bool, Option("By statics alone, without a run: a bound beyond which no equilibrium exists.")
     ] = False,
+    dry_run: prepare.DryRun = False,
     no_runs: Annotated[bool, Option("Keep no runs of both sides of a bracket, which plot and report show.")] = False,
     screen: command_line.Screen,
 ) -> command_line.Report:
@@ -42,6 +48,11 @@ def limit_command(
     Example: blocksim limit scenarios/tilting_wall.toml --vary ground.tilt=20deg:40deg
     """
     document = source.document()
+    if dry_run:
+        if over is not None or both_laws or static:
+            raise typer.BadParameter("an estimate is of one search; leave --over, --both-laws and --static out")
+        cases = limit_plan.read_limit(document, options).cases_of_one_change()
+        return prepare.estimate_report(estimate_of(cases), options.jobs, screen, [ONE_CHANGE])
     if static:
         if both_laws or over is not None:
             raise typer.BadParameter("statics has one key and no law; leave --both-laws and --over out")
@@ -121,7 +132,11 @@ def _comparison(one: limit_answer.LimitAnswer, other: limit_answer.LimitAnswer) 
 
 
 def fragility_command(
-    source: prepare.ScenarioInput, options: fragility.FragilityOptions, screen: command_line.Screen
+    source: prepare.ScenarioInput,
+    options: fragility.FragilityOptions,
+    *,
+    dry_run: prepare.DryRun = False,
+    screen: command_line.Screen,
 ) -> command_line.Report:
     """Find the probability of collapse over an intensity.
 
@@ -136,6 +151,8 @@ def fragility_command(
     plan = fragility.read_fragility(source.document(), options)
     base = plan.document.build()
     prepare.warn_of_values([base], screen)
+    if dry_run:
+        return prepare.estimate_report(estimate_of(plan.cases), options.jobs, screen)
     prepare.announce_compilation(kernels_of(base), quiet=screen.silent)
     heads = {head.key: head for head in plan.cases.heads}
     with progress.exit_on_stop(), progress.case_progress(heads.values(), quiet=screen.silent) as on_row:

@@ -1,8 +1,9 @@
 """What comes before a run: reading the scenario, so that later mistakes also point into the file, and compiling."""
 
+import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,8 @@ from blocksim.cli import app, command_line, output
 from blocksim.errors import ScenarioError
 from blocksim.options import Option
 from blocksim.scenario import Document, Scenario, check, mistakes
+from blocksim.study import plan
+from blocksim.world.free_memory import readable
 from blocksim.world.step import SkinTooSmallError, StepError
 
 
@@ -41,6 +44,31 @@ def warn_of_values(scenarios: Iterable[Scenario], screen: command_line.Screen) -
     found = () if screen.silent else (text for one in scenarios for text in check.implausible_values(one))
     for text in dict.fromkeys(found):
         screen.note(f"warning: {text}")
+
+
+DryRun = Annotated[bool, Option("Print number of cases, cost and size without running anything.")]
+
+
+def estimate_report(
+    found: plan.Estimate, jobs: int | None, screen: command_line.Screen, more: Iterable[str] = ()
+) -> command_line.Report:
+    """Return what a study comes to without running it, with what its numbers hold for."""
+    cores = jobs or os.cpu_count() or 1
+    on = f"{cores} core{'' if cores == 1 else 's'}"
+    until_rest = "; less if they stop at rest" if found.stop_at_rest else ""
+    lines = [
+        f"cases      {found.cases}",
+        f"solving    at most about {output.duration(found.seconds / cores)} on {on}",
+        f"results    at most about {readable(found.bytes)}",
+        f"memory     about {readable(found.memory)} for a process that runs one case",
+        f"from the steps of {found.looked_at} cases at the measured speed{until_rest}",
+    ]
+    if found.impossible:
+        which = f"{found.impossible} of these {found.looked_at}"
+        lines.append(f"{which} cannot be simulated; the first: {found.reason}")
+    return command_line.Report(
+        [*lines, *more], {**asdict(found), "jobs": cores}, always=() if screen.as_json else found.remarks
+    )
 
 
 def announce_compilation(kernels: str, *, quiet: bool) -> None:

@@ -40,9 +40,11 @@ def sensitivity_command(
             raise OutputExistsError(f"{out}: cannot be created: {reason}")
         if out.exists() and not overwrite:
             raise OutputExistsError(f"{out}: already exists; --overwrite replaces it")
+    document = source.document()
+    prepare.warn_of_values([document.without_sweep().build()], screen)
     start = partial(prepare.announce_compilation, quiet=screen.silent)
     with progress.count_progress("runs", quiet=screen.silent) as on_member:
-        found = sensitivity(source.document(), replace(options, on_start=start, on_member=on_member))
+        found = sensitivity(document, replace(options, on_start=start, on_member=on_member))
     if out is not None:
         text = io.StringIO()
         writer = csv.DictWriter(text, ["output", "unit", "key", *found.method.columns], lineterminator="\n")

@@ -1,8 +1,7 @@
 """blocksim sweep: many runs of one scenario, and what it shows: the estimate of --dry-run, and the table."""
 
-import os
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +14,6 @@ from blocksim.scenario import Document
 from blocksim.simulation.observables import DISPLACEMENT, END_SPEED, FIRST_MOVED, FIRST_MOVER, MOVES_ON, OUTCOME, TURN
 from blocksim.study import manifest, plan, rows, sweep
 from blocksim.view.sweeps.data import short_names
-from blocksim.world.free_memory import readable
 
 MOST_ROWS = 40
 MOST_FAILURES = 5
@@ -36,7 +34,7 @@ def sweep_command(
         Option("Run nothing; make sweep.csv from the shards in a folder.", flags=("--merge",), metavar="DIR"),
     ] = None,
     allow_missing: Annotated[bool, Option("Merge the cases finished so far.")] = False,
-    dry_run: Annotated[bool, Option("Print number of cases, cost and size without running anything.")] = False,
+    dry_run: prepare.DryRun = False,
     screen: command_line.Screen,
 ) -> command_line.Report:
     """Run a scenario many times with some keys varied.
@@ -55,24 +53,10 @@ def sweep_command(
     document = options.document(Document.read(scenario).with_settings(settings or []))
     base = document.build()
     prepare.warn_of_values([base], screen)
+    for text in rows.check_experiment(base):
+        screen.note(f"warning: {text}")
     if dry_run:
-        found = plan.estimate(document, keep_cases=options.keep_cases)
-        cores = options.jobs or os.cpu_count() or 1
-        on = f"{cores} core{'' if cores == 1 else 's'}"
-        until_rest = "; less if they stop at rest" if found.stop_at_rest else ""
-        lines = [
-            f"cases      {found.cases}",
-            f"solving    at most about {output.duration(found.seconds / cores)} on {on}",
-            f"results    at most about {readable(found.bytes)}",
-            f"memory     about {readable(found.memory)} for a process that runs one case",
-            f"from the steps of {found.looked_at} cases at the measured speed{until_rest}",
-        ]
-        if found.impossible:
-            which = f"{found.impossible} of these {found.looked_at}"
-            lines.append(f"{which} cannot be simulated; the first: {found.reason}")
-        return command_line.Report(
-            lines, {**asdict(found), "jobs": cores}, always=() if screen.as_json else found.remarks
-        )
+        return prepare.estimate_report(plan.estimate(document, keep_cases=options.keep_cases), options.jobs, screen)
     for kernels in sweep.kernels_for(document):
         prepare.announce_compilation(kernels, quiet=screen.silent)
     heads = () if base.sweep is None else rows.heads_of(base.sweep)

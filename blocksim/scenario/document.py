@@ -19,10 +19,23 @@ MAX_SHOWN = 110
 
 _SYNTAX_PLACE = re.compile(r" \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")
 _TWICE = re.compile("Cannot (overwrite a value|declare|mutate|redefine)|Duplicate inline table key")
+UNENDED = ("Illegal character '\\n'", "Unterminated string")
 _CLEARER = {
-    "Illegal character '\\n'": "a string in quotes must end on its line",
+    UNENDED[0]: "a string in quotes must end on its line",
     "Expected newline or end of document after a statement": "this cannot follow here; strings need quotes",
 }
+_CURLY = re.compile("[\u201c-\u201f\u2018-\u201b\u00ab\u00bb`]")  # quotes of word processors, backticks
+_SLIPS = (  # habits from elsewhere, by what stands where tomllib stops
+    (_CURLY, "straight quotes are needed, \" or '"),
+    (re.compile(r"//|/\*"), "a comment begins with #"),
+    (re.compile(r";"), "a line ends without a semicolon; a comment begins with #"),
+    (re.compile(r"%"), "write a share, such as 0.2 for 20 per cent"),
+    (re.compile(r"(?i:true|false|yes|no|on|off)\b"), "write true or false, in lower case"),
+    (re.compile(r"(?i:none|null|nil)\b"), "no such value; leave the key out"),
+    (re.compile(r"(?<=[0-9]),[0-9]"), "write decimals with a point"),
+    (re.compile(r"(?<=[A-Za-z0-9_\"']):"), "write KEY = VALUE, with an equals sign"),
+    (re.compile(r"(?<== )[A-Za-z]"), "strings need quotes"),
+)
 _SPACE = re.compile(r"(?:[ \t\n]|#[^\n]*)*")
 _VALUE = re.compile(
     r'"""(?:[^\\"]|\\[\s\S]|"{1,2}(?!"))*"{3,5}'
@@ -95,7 +108,10 @@ class ScenarioText:
             head = re.match(r"\s*(\[*)([^=\]]*[^=\]\s])?", line)
             start, end = (head.start(2), head.end(2)) if head is not None and head[2] else (0, len(line))
             return self.problem_in("this key or table is defined further up", "", Span(number, start, end - start))
-        message = _CLEARER.get(message) or f"not valid TOML: {message[:1].lower()}{message[1:]}"
+        curly = _CURLY.search(line) if message in UNENDED else None
+        column = column if curly is None else curly.start()
+        slip = next((text for pattern, text in _SLIPS if pattern.match(line, column)), None)
+        message = slip or _CLEARER.get(message) or f"not valid TOML: {message[:1].lower()}{message[1:]}"
         return self.problem_in(message, "", Span(number, column, 1))
 
 

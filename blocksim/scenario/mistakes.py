@@ -174,6 +174,7 @@ def _wrong_type(entry: ErrorDetails, path: KeyPath) -> str:
             quote = "; quote the whole dotted key" if isinstance(value, Mapping) else ""
             return f"{toml(value)} is not a string in quotes{quote}"
         case "bool_type":
-            return f"{toml(value)} is neither true nor false"
+            meant = str(value).lower() if str(value).lower() in ("true", "false") else "true or false"
+            return f"{toml(value)} is neither true nor false; write {meant}, in lower case and without quotes"
         case _:
             return f"{toml(value)}: {entry['msg'][0].lower()}{entry['msg'][1:]}"

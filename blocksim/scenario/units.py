@@ -3,6 +3,7 @@
 import functools
 import math
 import re
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from fractions import Fraction
@@ -78,6 +79,7 @@ _SUGGESTED = "m cm mm um km s ms us min rad deg Hz Pa kPa MPa GPa kN N kg g"
 
 _FACTOR = r"[A-Za-zµμ°_]+[0-9]?(?:\^-?[1-9][0-9]?)?"
 _EXPRESSION = re.compile(rf"{_FACTOR}(?:[ ]?[*/·][ ]?{_FACTOR}|[ ]{_FACTOR})*")
+_POWER = re.compile(r"([A-Za-zµμ°])([2-9])\b")
 _PART = re.compile(r"([*/·]?)[ ]?([A-Za-zµμ°_]+[0-9]?)(?:\^(-?[0-9]+))?")
 _SUPERSCRIPTS = str.maketrans({"²": "^2", "³": "^3"})
 _MAX_LENGTH = 40
@@ -142,7 +144,8 @@ _TEXT = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
 _TEXT_SCHEMA = {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-zµμ°]"}
 _DECIMAL_COMMA = re.compile(r"\s*([+-]?[0-9]+),([0-9]+)(?![0-9]*,)(.*)", re.DOTALL)
 _MAX_LENGTH_QUANTITIES = 80
-_MAX_SHOWN = 40
+MAX_SHOWN = 40
+PERCENT = ("%", "percent", "pct")
 LEAST, MOST = 1e-18, 1e30
 """Bounds (SI) of positive numbers and of all numbers: products of many such numbers stay finite doubles."""
 
@@ -153,17 +156,17 @@ def toml(value: object) -> str:
         case bool():
             text = str(value).lower()
         case str():
-            short = value if len(value) <= _MAX_SHOWN else value[:_MAX_SHOWN] + "…"
+            short = value if len(value) <= MAX_SHOWN else value[:MAX_SHOWN] + "…"
             escaped = short.replace("\\", "\\\\").replace('"', '\\"')
             text = f'"{"".join(c if c.isprintable() else repr(c)[1:-1] for c in escaped)}"'
-        case int() if abs(value) > 10**_MAX_SHOWN:
+        case int() if abs(value) > 10**MAX_SHOWN:
             text = "a huge whole number"
         case list() | tuple():
             text = "a list"
         case dict():
             text = "a table"
         case _:
-            text = str(value)[:_MAX_SHOWN]
+            text = str(value)[:MAX_SHOWN]
     return text
 
 
@@ -237,6 +240,7 @@ class Quantity(FieldReader):
     at_least: float | None = None
     below: float | None = None
     at_most: float | None = None
+    negative: str = ""  # what to write in place of a negative value
 
     @property
     def wanted(self) -> str:
@@ -263,7 +267,8 @@ class Quantity(FieldReader):
             raise invalid(f"{toml(value)} is not a finite number; {self.wanted} is needed")
         low, least, high, most = self.above, self.at_least, self.below, self.at_most
         if (low is not None and number <= low) or (least is not None and number < least):
-            raise invalid(f"{toml(value)} is too small; {self.wanted} is needed")
+            instead = f"; {self.negative}" if self.negative and number < 0.0 else ""
+            raise invalid(f"{toml(value)} is too small; {self.wanted} is needed{instead}")
         if (high is not None and number >= high) or (most is not None and number > most):
             raise invalid(f"{toml(value)} is too large; {self.wanted} is needed")
         if abs(number) > MOST:
@@ -307,6 +312,9 @@ class FrictionCoefficient(FieldReader):
     def read(self, value: object) -> float:
         """Turn a coefficient or a friction angle into a coefficient."""
         if isinstance(value, str):
+            bare = _TEXT.fullmatch(value.replace(",", "."))
+            if bare and (not bare[2] or bare[2] in PERCENT):
+                return Quantity(NUMBER).read(value)
             return math.tan(Quantity(ANGLE, at_least=0.0, below=math.pi / 2).read(value))
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise invalid(f"{toml(value)} is not a number; {self.wanted} is needed")
@@ -327,10 +335,13 @@ def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
     found = _TEXT.fullmatch(text) if len(text) <= _MAX_LENGTH_QUANTITIES else None
     comma = _DECIMAL_COMMA.fullmatch(text) if len(text) <= _MAX_LENGTH_QUANTITIES else None
     if comma:
-        raise ValueError(f'write a decimal point: "{comma[1]}.{comma[2]}{comma[3]}"')
+        text = f"{comma[1]}.{comma[2]}{comma[3]}"
+        raise ValueError(f"write {text}, without quotes" if wanted is NUMBER else f'write a decimal point: "{text}"')
     number, unit = (None, None) if found is None else found.groups()
+    if number is not None and unit in PERCENT:
+        raise ValueError(f"write {float(number) / 100.0:g}, without quotes")
     if wanted is NUMBER and unit is None:
-        raise ValueError("write a number without quotes")
+        raise ValueError("write a number without quotes" if number is None else f"write {number}, without quotes")
     if number is None:
         raise ValueError(f'write a number and a unit, such as "{wanted.example}"')
     if unit is None:
@@ -341,6 +352,12 @@ def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
         unknown = str(error)
         if not unknown:
             raise ValueError(f"{toml(unit)[1:-1]!r} is not a unit") from None
+        powers, meant = _POWER.sub(r"\1^\2", unit), None
+        with suppress(UnitError):
+            meant = parse_unit(powers).dimension
+        if meant is not None and powers != unit:
+            kind = "" if meant == wanted.dimension else f", {_NAMES.get(meant, 'another quantity')}"
+            raise ValueError(f"write the unit as {powers!r}{kind}") from None
         similar = similar_unit(unknown, unit, wanted.dimension)
         hint = f"did you mean {similar!r}?" if similar else f'write it as in "{wanted.example}"'
         raise ValueError(f"unknown unit {unknown!r}, {hint}") from None

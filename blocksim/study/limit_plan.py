@@ -32,7 +32,16 @@ from blocksim.simulation.provenance import code_hash
 from blocksim.statics.blockwork import why_not_sustained
 from blocksim.study import answer, criterion, executors, manifest
 from blocksim.study.criterion import Criterion, Stability
-from blocksim.study.plan import RANGE, Values, Variations, build_distributions, levels_of, variations_option
+from blocksim.study.plan import (
+    RANGE,
+    Cases,
+    Design,
+    Values,
+    Variations,
+    build_distributions,
+    levels_of,
+    variations_option,
+)
 from blocksim.study.rows import Head, Row, heads_of
 
 Kind = TypeVar("Kind")
@@ -342,6 +351,14 @@ class LimitPlan:
         """Return what runs came to, from the smallest value up; `undecided` is what those count as that move on."""
         found = {value: self.criterion.verdict(rows[value]) for value in sorted(rows)}
         return {value: undecided if one is Stability.UNDECIDED else one for value, one in found.items()}
+
+    def cases_of_one_change(self) -> Cases:
+        """Return the runs of a search that scans its range and finds one change in the middle."""
+        known, middle = dict[Number, bool](), self.span.grid()[self.span.count // 2]
+        while values := next_values(self.span, known, self.tolerance):
+            known |= {value: value < middle for value in values}
+        settings = [self.settings(value) for value in sorted(known)]
+        return Cases(self.document, Design({key: [one[key] for one in settings] for key in settings[0]}), ())
 
     @property
     def name(self) -> str:

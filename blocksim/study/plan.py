@@ -529,10 +529,14 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
 
     Raises what building the document, its plan or a scene raises, InvalidInputError where nothing is varied.
     """
+    plan = plan_of(document.build())
+    return estimate_of(cases_of(document, plan), tuple(remarks(plan)), keep_cases=keep_cases)
+
+
+def estimate_of(cases: Cases, remarks: tuple[str, ...] = (), *, keep_cases: bool = False) -> Estimate:
+    """Return what cases come to, with all frames of each or without; nothing is written."""
     from blocksim.world.describe import describe  # noqa: PLC0415 - the solver, which reading a sweep does not need
 
-    plan = plan_of(document.build())
-    cases = cases_of(document, plan)
     numbers = list(range(len(cases)))
     if len(cases) > LOOKED_AT:  # a random choice: evenly spaced ones may meet one value of a key only
         numbers = sorted(np.random.default_rng(0).choice(len(cases), LOOKED_AT, replace=False).tolist())
@@ -550,5 +554,5 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
         bytes=round(share * len(cases) * fmean(rows or [0.0])),
         memory=max((one.memory for one in described), default=0),
         stop_at_rest=sum(case.scenario.time.stop_at_rest for case in chosen if case.scenario is not None),
-        remarks=tuple(remarks(plan)),
+        remarks=remarks,
     )

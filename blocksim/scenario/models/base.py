@@ -94,7 +94,10 @@ class Whole(units.FieldReader):
     def read(self, value: object) -> object:
         """Pass a whole number in the range; raises a pydantic error."""
         if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= self.most:
-            raise units.invalid(f"{units.toml(value)} is not a whole number from {self.least} to {self.most}")
+            text, bare = str(value).strip().removesuffix(".0"), ", without quotes" if isinstance(value, str) else ""
+            is_whole = not isinstance(value, bool | int) and text.lstrip("-").isdecimal()
+            how = f"; write {text[: units.MAX_SHOWN]}{bare}" if is_whole else ""
+            raise units.invalid(f"{units.toml(value)} is not a whole number from {self.least} to {self.most}{how}")
         return value
 
     def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
@@ -121,16 +124,19 @@ PATH_SCHEMA = pydantic.WithJsonSchema({"type": "string", "minLength": 1})
 """Of the path of a file, for editors."""
 
 
-def table_path(value: object, folder: Path | str | None, example: str) -> Path:
-    """Return the file that a key names, found from a folder, or unchecked without one; raises a pydantic error."""
+def table_path(value: object, folder: Path | str | None, example: str, *key: str) -> Path:
+    """Return the file that a key names, found from a folder, or unchecked without one; raises a pydantic error.
+
+    The key is given where a whole table is read, not its value alone.
+    """
     if not isinstance(value, str) or not value or "\0" in value:
-        raise units.invalid(f"{units.toml(value)} is not the path of a table, such as {units.toml(example)}")
+        raise units.invalid(f"{units.toml(value)} is not the path of a table, such as {units.toml(example)}", *key)
     if folder is None:
         return Path(value)
     try:
         return input_files.table_in(folder, value)
     except input_files.OutOfReachError as error:
-        raise units.invalid(str(error)) from None
+        raise units.invalid(str(error), *key) from None
 
 
 def _identifier(value: object) -> object:

@@ -77,7 +77,7 @@ class Sampled(base.Table):
         for other in ("times", cls.key):
             if other in value:
                 raise q.invalid(f"table and {other} are both given; keep one of them", other)
-        path = base.table_path(value["table"], (info.context or {}).get("folder", ""), "load.csv")
+        path = base.table_path(value["table"], (info.context or {}).get("folder", ""), "load.csv", "table")
         needed = f"{motion.TIME},{cls.column}"
         try:
             content = motion.content_of(path, MAX_BYTES)

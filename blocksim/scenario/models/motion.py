@@ -56,6 +56,9 @@ MAX_ROWS = 500_000
 LEAST_ROWS = 2
 
 
+BACK = "for the opposite way turn the direction by 180 deg"
+
+
 class Harmonic(Table):
     """u(t) = amplitude r(t) sin(2 pi frequency (t - start) + phase) from `start` on, for `duration`.
 
@@ -63,7 +66,7 @@ class Harmonic(Table):
     """
 
     kind: Literal["harmonic"] = setting("kind of motion")
-    amplitude: q.PositiveLength = setting("largest displacement")
+    amplitude: Annotated[float, q.Quantity(q.LENGTH, above=0.0, negative=BACK)] = setting("largest displacement")
     frequency: q.PositiveFrequency = setting("cycles per second")
     phase: q.Angle = setting("phase at the start", 0.0)
     direction: q.Angle = setting("direction of the motion, counter-clockwise from +x", 0.0)
@@ -233,7 +236,7 @@ MOST_CYCLES = 1000.0
 Shape = Literal["sine", "half-sine", "rectangular", "cosine"]
 SINGLE = ("half-sine", "rectangular")  # shapes of half a cycle, which do not repeat
 ABRUPT = ("rectangular", "cosine")  # shapes that begin at their largest acceleration
-Acceleration = Annotated[float, q.Quantity(q.ACCELERATION, above=0.0)]
+Acceleration = Annotated[float, q.Quantity(q.ACCELERATION, above=0.0, negative=BACK)]
 
 
 class Pulse(Table):
@@ -298,10 +301,12 @@ class Ramp(Table):
     """Once over a distance: at constant speed, or smoothly, u = distance (10 s^3 - 15 s^4 + 6 s^5)."""
 
     kind: Literal["ramp"] = setting("kind of motion")
-    distance: q.PositiveLength = setting("way from start to end")
+    distance: Annotated[float, q.Quantity(q.LENGTH, above=0.0, negative=BACK)] = setting("way from start to end")
     direction: q.Angle = setting("direction of the motion, counter-clockwise from +x", 0.0)
     duration: q.PositiveTime | None = setting("time from start to end; give this or speed", None)
-    speed: q.PositiveSpeed | None = setting("greatest speed; give this or duration", None)
+    speed: Annotated[float, q.Quantity(q.SPEED, above=0.0, negative=BACK)] | None = setting(
+        "greatest speed; give this or duration", None
+    )
     course: Course = setting("constant (at once at full speed) or smooth (starts and ends without a jerk)", "constant")
     start: q.NonNegativeTime = setting("start of the motion; the body rests before", 0.0)
 

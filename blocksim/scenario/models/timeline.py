@@ -138,9 +138,11 @@ class Start(Table):
 
     def _check(self) -> None:
         if self.hold and not self.settle:
-            raise q.invalid("nothing is held without settle = true", "hold")
+            raise q.invalid("nothing is held without settle = true: add it, or leave hold out", "hold")
         if self.release != "at rest" and not self.settle:
-            raise q.invalid("all is released at once without settle = true", "release")
+            raise q.invalid(
+                "without settle = true nothing waits to be released: add it, or leave release out", "release"
+            )
 
 
 When = Literal["rest"]

@@ -198,7 +198,7 @@ class Polygons(PolygonStructure):
         if "cells" in data:
             raise q.invalid("table and cells are both given; keep one of them", "table")
         unit = q.Quantity(q.LENGTH, above=0.0).read(data.get("unit", 1.0))
-        path = table_path(data["table"], (info.context or {}).get("folder"), "wall.geojson")
+        path = table_path(data["table"], (info.context or {}).get("folder"), "wall.geojson", "table")
         try:
             drawn = read_drawing(path)
         except DrawingError as error:
