@@ -176,13 +176,14 @@ def _far_points(
             reached = [float(np.abs(one[number]).max()) for one in curves.values()]
             least, is_chosen = LEAST_SCATTER * fmean(reached), axis is axes[0]
             far = dict(outliers.far_values(reached, least, axis.unit, is_chosen=is_chosen))
-            for place, (replicate, one) in enumerate(curves.items()):
+            for rank, (replicate, one) in enumerate(curves.items()):
                 at = lines[probe, replicate]
                 found = [(at[point], why) for point, why in outliers.spikes(one[number].tolist(), axis.unit)]
-                if not found and place in far:
-                    found = [(at[int(np.abs(one[number]).argmax())], f"the largest {axis.name}, {far[place]}")]
+                if not found and rank in far:
+                    found = [(at[int(np.abs(one[number]).argmax())], f"the largest {axis.name}: {far[rank]}")]
                 for line, why in found:
-                    yield f"{line.where}:{line.number}: probe {probe}, {axis.column}, replicate {replicate}: {why}"
+                    place = f"{input_files.relative_path(line.where)}:{line.number}"
+                    yield f"{place}: probe {probe}, {axis.column}, replicate {replicate}: {why}"
 
 
 def _axes(table: input_files.CsvTable) -> list[Axis]:

@@ -145,6 +145,7 @@ def _end_lines(result: Result) -> Iterator[str]:
     if moved is not None:  # what moved, how far on the way and first: blocks may end nearer
         told = dict(moved.lines(output.number))
         outcome, first = told.pop(observables.OUTCOME), told.pop(observables.FIRST, "")
+        outcome += " (stopped: overlap)" * summary.reason.startswith(loop.STOPPED)
         yield f"{outcome}: {', '.join(map(' '.join, told.items()))}" + (
             f"\n{observables.FIRST}: {first}" if first else ""
         )

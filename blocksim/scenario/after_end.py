@@ -18,7 +18,7 @@ def cut_off(scenario: Scenario) -> Iterator[str]:
     end, found = scenario.time.end, dict[str, list[str]]()
     for key, begin, last in _spans(scenario):
         if begin >= end:
-            found.setdefault(f"no effect before {begin:g} s", []).append(key)
+            found.setdefault(f"nothing changes before {begin:g} s", []).append(key)
         elif last > end * (1.0 + ROUND_OFF):
             found.setdefault(f"cut off, as complete only at {last:g} s", []).append(key)
     for what, keys in found.items():

@@ -174,7 +174,8 @@ def _wrong_type(entry: ErrorDetails, path: KeyPath) -> str:
             quote = "; quote the whole dotted key" if isinstance(value, Mapping) else ""
             return f"{toml(value)} is not a string in quotes{quote}"
         case "bool_type":
-            meant = str(value).lower() if str(value).lower() in ("true", "false") else "true or false"
-            return f"{toml(value)} is neither true nor false; write {meant}, in lower case and without quotes"
+            word = value.lower() if isinstance(value, str) else ""
+            how = f"{word}, in lower case and without quotes" if word in ("true", "false") else "true or false"
+            return f"{toml(value)} is neither true nor false; write {how}"
         case _:
             return f"{toml(value)}: {entry['msg'][0].lower()}{entry['msg'][1:]}"

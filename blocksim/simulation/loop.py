@@ -313,7 +313,7 @@ def outcome_of(code: int, ledger: balance.EnergyLedger) -> Outcome:
     return RESIDUAL if outcome.status == "finished" and not balance.adds_up(ledger) else outcome
 
 
-STOPPED = "stopped: overlap"
+STOPPED = "stopped: "  # begin of the reason of a run that an overlap has ended after the fall
 
 
 def after_a_fall(outcome: Outcome, code: int, ledger: balance.EnergyLedger, response: object) -> Outcome:
@@ -323,7 +323,7 @@ def after_a_fall(outcome: Outcome, code: int, ledger: balance.EnergyLedger, resp
     """
     if code != arrays.OVERLAP_LIMIT or response != observables.Response.FELL or not balance.adds_up(ledger):
         return outcome
-    return Outcome("finished", f"fell ({STOPPED}): {outcome.reason}", ExitCode.SUCCESS)
+    return Outcome("finished", f"{STOPPED}{outcome.reason}", ExitCode.SUCCESS)
 
 
 def run_loop(

@@ -311,8 +311,8 @@ def _warnings(
     if residual > balance.RESIDUAL_PROMISE:
         yield f"relative energy error {residual:.1e}, above {balance.RESIDUAL_PROMISE:g}"
     yield from after_end.cut_off(scenario)
-    if loop.STOPPED in ended.outcome.reason:
-        yield f"{ended.outcome.reason}: blocks have not ended where the final table has them"
+    if ended.outcome.reason.startswith(loop.STOPPED):
+        yield "the run stopped after the fall, while blocks were moving: the final table is not that of rest"
     if every < (1.0 - memory.ROUNDING) * float(ended.scene.world.controls[0].step):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     yield from _convergence_warnings(scenario, convergence_of(ended.scene))

@@ -152,3 +152,43 @@ def test_a_table_is_one_of_curves_or_of_final_positions(tmp_path: Path) -> None:
         load_table(path)
     path.write_text("block,quantity,unit,replicate,value\n1,x,mm,1,2\n")
     assert not has_curves(path)
+
+
+FAR = {
+    "a point that slipped": "71.3 70.2 7.13 72.5 69.9 71.8",
+    "a thousand times": "0.0713 70.2 72.5 69.9 71.8",
+    "two of six in cm": "7.02 70.2 7.13 72.5 69.9 71.8",
+    "one of three in m": "70.2 0.0713 72.5",
+    "neither of two": "7.13 71.3",
+    "far, and of no unit": "70.2 72.5 69.9 71.8 90.0",
+    "just below": "70 71 72 73 77.9",
+    "within the reading": "16 16 16 16 18",
+    "beyond the reading": "16 16 16 16 19",
+    "of another sign": "70.2 72.5 69.9 71.8 -71.1",
+}
+
+
+def test_values_far_from_the_others_are_warned_of_with_their_line(
+    golden: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    texts = []
+    for name, values in FAR.items():
+        rows = "".join(f"1,x,mm,{number},{value}\n" for number, value in enumerate(values.split(), 1))
+        Path("far.csv").write_text(HEADER + rows)
+        texts.append("\n".join([f"{name}: {values}", *load_table("far.csv").warnings]))
+    turned = "".join(f"1,rotation,deg,{number},{value}\n" for number, value in enumerate((-90, -90, -1.571, -89), 1))
+    Path("far.csv").write_text(HEADER + turned)
+    texts.append("\n".join(["radians", *load_table("far.csv").messages]))
+    curves = "".join(f"jack,{n},{k},{n + 10 * k}\n" for n in range(1, 6) for k in range(4))
+    for old, new in {"": "", "jack,2,2,22": "jack,2,2,220", "jack,3,1,": "jack,3,10,", "4,3,34": "4,3,90"}.items():
+        Path("curves.csv").write_text(HEAD + curves.replace(old or HEAD, new or HEAD))
+        texts.append("\n".join([f"curves, {old} as {new}", *load_curves("curves.csv").warnings]))
+    golden("\n\n".join(texts))
+
+
+def test_semicolons_and_decimal_commas_are_read_as_commas_and_points(tmp_path: Path) -> None:
+    text = HEADER + "1,x,mm,1,71.69\n1,x,mm,2,7.3e1\n1,x,mm,3,70\n"
+    table = load_table(written(tmp_path, text))
+    for foreign in (text.replace(",", ";"), text.replace(",", ";").replace(".", ",")):
+        assert load_table(written(tmp_path, foreign)).measurements == table.measurements

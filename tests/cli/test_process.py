@@ -128,13 +128,14 @@ def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path) -> 
     assert frames.x[0].tolist() == pytest.approx([0.016, 0.038, 0.060], abs=1e-6)
 
 
-def test_answer_that_nobody_can_take_is_74(process: Process) -> None:
+def test_answer_that_nobody_can_take_is_74_and_a_reader_that_has_gone_ends_as_it_ends_others(process: Process) -> None:
     read_end, write_end = os.pipe()
     os.close(read_end)
     with Path("/dev/full").open("w") as full:
-        for target, told in ((full, "the answer: cannot be written: No space left on device\n"), (write_end, "")):
+        no_space = "the answer: cannot be written: No space left on device\n"
+        for target, code, told in ((full, 74, no_space), (write_end, 128 + signal.SIGPIPE, "")):
             ended = end_of(process("schema", stdout=target))
-            assert (ended.code, ended.err) == (74, told)
+            assert (ended.code, ended.err) == (code, told)
     os.close(write_end)
 
 

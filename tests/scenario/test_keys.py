@@ -119,6 +119,7 @@ def test_values_that_are_hardly_meant_are_warned_of(golden: Golden) -> None:
             (values, Document.read(APART).with_values({**values, "bodies.0.y": 500}).build())
             for values in VALUES["bounce"]
         ),
+        *((values, Document.read(APART).with_values(values).build()) for values in VALUES["after_end"]),
         *((values, scene({**column(0.1, 0.05, 0.005), **values})) for values in VALUES["soil"]),
     ]
     golden("\n\n".join("\n".join([json.dumps(values), *implausible_values(one)]) for values, one in scenarios))

@@ -8,9 +8,10 @@ import pytest
 
 from blocksim.bench.harness import pushed_wall
 from blocksim.errors import ExitCode
-from blocksim.scenario import PlacedBody, Scenario, load_scenario, place_bodies
+from blocksim.scenario import PlacedBody, Scenario, load_scenario, place_bodies, scenario_from_mapping
 from blocksim.simulation import ensemble, simulate
 from blocksim.simulation.ensemble import EnsembleEnd, MemberEnd, MemberFailure, run_ensemble, run_in_batches
+from blocksim.simulation.loop import STOPPED
 from blocksim.simulation.observables import AT_REST, Movement, MovingSupport, Response, Watch
 from blocksim.simulation.schemes import build_stacks
 from blocksim.world import build, memory
@@ -130,6 +131,36 @@ def test_members_that_cannot_be_built_or_fail_do_so_in_their_place_and_the_other
     (end,) = next(run_in_batches(scenarios[:1]))
     assert isinstance(end, MemberFailure)
     assert isinstance(end.error, SceneTooLargeError)
+
+
+TOPPLES: dict[str, Any] = {
+    "schema": 1,
+    "name": "topples",
+    "materials": {"stone": {"density": 2500, "young_modulus": 3e10, "poisson_ratio": 0.2}},
+    "blocks": {"b": {"width": 0.02, "height": 0.1, "length": 0.02, "material": "stone"}},
+    "bodies": [{"block": "b", "x": 0, "y": 0.05}],
+    "ground": {"tilt": "15 deg"},
+    "friction": {"block_ground": 1.0},
+    "contact": {"stiffness_scale": 1e-5},
+    "time": {"end": 1},
+}
+
+
+@pytest.mark.parametrize(
+    ("most", "status", "outcome"),
+    [(5e-4, "finished", "fell"), (2.5e-4, "failed", None), (5e-3, "finished", "fell")],
+    ids=["overlap where it lands", "overlap where it begins to turn", "no overlap"],
+)
+def test_a_run_that_an_overlap_ends_fell_where_it_had_fallen_and_else_has_no_outcome(
+    most: float, status: str, outcome: str | None
+) -> None:
+    scenario = scenario_from_mapping({**TOPPLES, "contact": {"stiffness_scale": 1e-5, "max_overlap": most}})
+    summary = simulate(scenario).summary
+    assert summary.movement is not None
+    assert (summary.status, summary.movement.values["outcome"]) == (status, outcome)
+    is_stopped = summary.reason.startswith(STOPPED)
+    assert is_stopped == any("stopped after the fall" in text for text in summary.warnings) == (most == 5e-4)
+    assert_same(run_ensemble([scenario])[0], scenario)
 
 
 def test_batches_take_no_more_scenarios_than_they_run(monkeypatch: pytest.MonkeyPatch) -> None:

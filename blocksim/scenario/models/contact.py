@@ -91,7 +91,7 @@ class Restitution(_Short):
             return {"block_block": value, "block_ground": value}
         if isinstance(value, Mapping | Restitution):
             return value
-        if isinstance(value, str):  # a number in quotes, or in per cent
+        if isinstance(value, str) and any(letter.isdigit() for letter in value):  # a number in quotes, or in per cent
             q.Quantity(q.NUMBER).read(value)
         raise q.invalid(f"{q.toml(value)} is not a restitution; write a number or {{ block_block, block_ground }}")
 
