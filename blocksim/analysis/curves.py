@@ -230,6 +230,8 @@ def compare_curves(
                 messages.append(_distance(f"{name}{sense}", found, repeats, table))
         if not any(row.block == name for row in rows):
             raise InvalidInputError(f"{table.source}: the probe '{name}' goes nowhere where it was measured")
+    if tolerance:
+        messages.append(f"ranges of repeats are widened by {100.0 * tolerance:g} % of their mean on both sides")
     return Comparison(tuple(rows), table.source, tuple(messages))
 
 

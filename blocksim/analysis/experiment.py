@@ -217,7 +217,8 @@ def _far_values(rows: Sequence[tuple[Measurement, dict[str, input_files.TableCel
         for place, why in outliers.far_values(values, outliers.READINGS[unit], unit):
             one, row = found[place]
             line = row["value"].line
-            yield f"{input_files.relative_path(line.where)}:{line.number}: block {block}, {quantity}, replicate {one.replicate}: {why}"
+            where = f"{input_files.relative_path(line.where)}:{line.number}"
+            yield f"{where}: block {block}, {quantity}, replicate {one.replicate}: {why}"
 
 
 def _measurement(row: dict[str, input_files.TableCell], problems: list[Problem]) -> Measurement | None:

@@ -117,15 +117,14 @@ def comparison_table(comparison: compare.Comparison) -> list[str]:
 
 def _range(row: compare.ComparisonRow, digits: int) -> str:
     """Return the measured range of a row, and the tolerance on both sides of it that decided."""
-    ends = [output.number(end, digits) for end in (row.minimum, row.maximum)]
-    text = ends[0] if row.minimum == row.maximum else f"[{', '.join(ends)}]"
-    if row.quantity == "rotation":
+    if row.quantity == "rotation" and row.n:
         return f"{output.number(row.mean, digits)} ± {compare.ROTATION_TOLERANCE:g}"
+    ends = [output.number(end, digits) for end in (row.minimum, row.maximum)]
+    if row.minimum != row.maximum:  # of curves a line below has what widens it
+        return f"[{', '.join(ends)}]"
     tolerance = row.minimum - row.lower
-    if not tolerance > 0.0:  # NaN: no limits
-        return text
-    share = "" if row.quantity in QUANTITIES else f"{PERCENT * tolerance / abs(row.mean):.3g} %"
-    return f"{text} ± {share or f'{tolerance:g}'}"
+    share = "" if row.quantity in QUANTITIES or not row.mean else f"{PERCENT * tolerance / abs(row.mean):.3g} %"
+    return f"{ends[0]} ± {share or f'{tolerance:g}'}"
 
 
 def verdict_lines(comparison: compare.Comparison) -> list[str]:
