@@ -131,8 +131,8 @@ MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the 
 def implausible_values(scenario: Scenario) -> list[str]:
     """Return a warning for each value that looks like one in another unit, of frictions swept ones too.
 
-    Also for soils of whose width or height no whole number of particles takes all, with a finer spacing that does, and
-    for what the end of the run cuts off.
+    Also for what was not read of drawings, for soils of whose width or height no whole number of particles takes all,
+    with a finer spacing that does, and for what the end of the run cuts off.
     """
     warnings = []
     for name, material in scenario.materials.items():
@@ -156,6 +156,7 @@ def implausible_values(scenario: Scenario) -> list[str]:
             if size > LONGEST_DRAWN:
                 key = overrides.format_key(("structures", number))
                 warnings.append(f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"')
+            warnings += structure.remarks
     warnings += _friction_angles(scenario)
     warnings += _impacts(scenario)
     for soil in placement.soil_tables(scenario):

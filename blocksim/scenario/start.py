@@ -257,8 +257,11 @@ def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
     for number, structure in enumerate(scenario.structures):
         if not isinstance(structure, base.PolygonStructure):
             needing.append((("structures", number, "block"), structure.block))
-        for place, cell in enumerate(structure.divide() if isinstance(structure, polygons.Polygons) else ()):
-            yield from unknown(("structures", number, "cells", place, "block"), "block", scenario.blocks, cell.block)
+        if isinstance(structure, polygons.Polygons):
+            for place, cell in enumerate(structure.cells_given):
+                key = ("structures", number, "cells", place, "block")
+                for one in unknown(key, "block", scenario.blocks, cell.block):
+                    yield one._replace(message=f"{structure.place_of(place)}{one.message}")
     for path, block in needing:
         if scenario.blocks[block].size_x == 0.0:
             yield Mistake(path, f"block {toml(block)} has no shape; {SHAPES}")

@@ -4,6 +4,7 @@ import json
 import math
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,11 @@ import pytest
 
 from blocksim.errors import InvalidInputError, ScenarioError, UnavailableError
 from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_hash, scenario_to_toml
+from blocksim.scenario.check import implausible_values
 from blocksim.scenario.document import Document
-from blocksim.scenario.structures.polygons import DrawingError, read_drawing, simplify
+from blocksim.scenario.structures.drawings import DrawingError, simplify
+from blocksim.scenario.structures.polygons import read_drawing
+from tests.golden import Golden
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
 WEDGE = [[1, 0], [1.5, 0.0], [2, 0], [1, 1], [1, 0]]
@@ -70,7 +74,7 @@ def test_geometries_without_features_are_read(tmp_path: Path) -> None:
     polygon = {"type": "Polygon", "coordinates": [SQUARE]}
     several = {"type": "MultiPolygon", "coordinates": [[SQUARE], [WEDGE]]}
     collected = {"type": "GeometryCollection", "geometries": [polygon, polygon]}
-    assert [len(read_drawing(written(tmp_path, data))) for data in (polygon, several, collected)] == [1, 2, 2]
+    assert [len(read_drawing(written(tmp_path, data)).outlines) for data in (polygon, several, collected)] == [1, 2, 2]
 
 
 def test_more_outlines_than_a_scenario_may_have_and_drawings_outside_are_refused(tmp_path: Path) -> None:
@@ -98,26 +102,159 @@ def test_settings_in_the_current_folder_do_not_reach_the_reader_of_dxf(tmp_path:
     assert subprocess.run(command, cwd=tmp_path, check=True, capture_output=True).stdout == b"False\n"
 
 
-def test_closed_polylines_of_a_dxf_file_are_blocks_by_their_layers(tmp_path: Path) -> None:
+@pytest.fixture
+def dxf() -> Any:
     ezdxf = pytest.importorskip("ezdxf", reason="reading DXF needs the extra dxf")
-    document = ezdxf.new()
-    space = document.modelspace()
-    space.add_lwpolyline([(0, 0), (1, 0), (1, 1), (0, 1)], close=True, dxfattribs={"layer": "pier"})
+    return ezdxf.new(units=6)  # metres
+
+
+def saved(folder: Path, document: Any) -> Path:
+    """Write a drawing, and a scenario of it in its own unit."""
+    document.saveas(folder / "wall.dxf")
+    text = TEXT.replace("wall.geojson", "wall.dxf").replace('unit = "1 cm"', "in_place = true")
+    (folder / "scene.toml").write_text(text)
+    return folder / "wall.dxf"
+
+
+UNIT = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+
+
+def test_closed_polylines_of_a_dxf_file_are_blocks_by_their_layers(tmp_path: Path, dxf: Any) -> None:
+    space = dxf.modelspace()
+    space.add_lwpolyline(UNIT, close=True, dxfattribs={"layer": "pier"})
     space.add_polyline2d([(1, 0), (2, 0), (1, 1)], close=True)
-    space.add_lwpolyline([(0, 0), (5, 5)])
-    space.add_line((0, 0), (1, 1))
-    document.saveas(tmp_path / "wall.dxf")
-    first, second = read_drawing(tmp_path / "wall.dxf")
-    assert (first.outline, first.properties) == ([(0, 0), (1, 0), (1, 1), (0, 1)], {"block": "pier"})
+    first, second = read_drawing(saved(tmp_path, dxf)).outlines
+    assert (first.outline, first.properties) == (UNIT, {"block": "pier"})
     assert (second.outline, second.properties) == ([(1, 0), (2, 0), (1, 1)], {})
-    space.add_lwpolyline([(0, 0, 0.5), (1, 0, 0), (1, 1, 0)], format="xyb", close=True)
-    document.saveas(tmp_path / "arcs.dxf")
-    with pytest.raises(DrawingError, match="has arcs"):
-        read_drawing(tmp_path / "arcs.dxf")
     for damaged in (b"", b"no drawing", b"\0" * 100, b"0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n90\nx\n"):
         (tmp_path / "wall.dxf").write_bytes(damaged)
         with pytest.raises((DrawingError, InvalidInputError)):
             read_drawing(tmp_path / "wall.dxf")
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e4])
+@pytest.mark.parametrize("off", [0.0, 1e-16, 9e-7])
+def test_a_polyline_whose_ends_meet_but_for_round_off_is_closed(
+    tmp_path: Path, dxf: Any, size: float, off: float
+) -> None:
+    points = [(size * (x + 1.0), size * y) for x, y in UNIT]
+    end = (points[0][0], points[0][1] + off * size)
+    dxf.modelspace().add_lwpolyline([*points, end])
+    dxf.modelspace().add_polyline3d([*points, (*end, 0.0)])
+    for one in read_drawing(saved(tmp_path, dxf)).outlines:
+        assert np.array(one.outline) == pytest.approx(np.array([*points[1:], end]), rel=1e-12) or one.outline == points
+
+
+def test_inserted_blocks_are_read_where_they_are_at_all_levels(tmp_path: Path, dxf: Any) -> None:
+    inner, outer = dxf.blocks.new("inner"), dxf.blocks.new("outer")
+    inner.add_lwpolyline(UNIT, close=True)
+    outer.add_blockref("inner", (10.0, 0.0), dxfattribs={"xscale": -2.0, "yscale": 3.0})
+    grid = {"row_count": 2, "row_spacing": 5.0, "column_count": 2, "column_spacing": 4.0, "layer": "pier"}
+    dxf.modelspace().add_blockref("outer", (100.0, 0.0), dxfattribs=grid)
+    found = read_drawing(saved(tmp_path, dxf)).outlines
+    boxes = [(*np.min(one.outline, axis=0), *np.max(one.outline, axis=0)) for one in found]
+    expected = [(108.0 + x, y, 110.0 + x, 3.0 + y) for y in (0.0, 5.0) for x in (0.0, 4.0)]
+    assert np.array(boxes) == pytest.approx(np.array(expected))
+    assert [one.properties["block"] for one in found] == ["pier"] * 4
+
+
+def test_polylines_drawn_from_behind_are_where_they_are_seen(tmp_path: Path, dxf: Any) -> None:
+    behind = {"extrusion": (0.0, 0.0, -1.0), "elevation": 2.0}
+    dxf.modelspace().add_lwpolyline(UNIT, close=True, dxfattribs=behind)
+    dxf.modelspace().add_polyline2d(UNIT, close=True, dxfattribs={"extrusion": (0.0, 0.0, -1.0)})
+    for one in read_drawing(saved(tmp_path, dxf)).outlines:
+        assert one.outline == [(-x, y) for x, y in UNIT]
+
+
+def hidden(document: Any, how: str, **attributes: object) -> None:
+    getattr(document.layers.add("aids"), how)()
+    document.modelspace().add_lwpolyline(UNIT, close=True, dxfattribs={"layer": "aids", **attributes})
+
+
+NO_BLOCKS = {
+    "open polylines": lambda document: [
+        document.modelspace().add_lwpolyline(UNIT[:size], dxfattribs={"handle": f"A{size}"}) for size in (2, 3, 4, 3, 2)
+    ],
+    "line": lambda document: document.modelspace().add_line((0, 0), (1, 1), dxfattribs={"handle": "A1"}),
+    "hatch": lambda document: document.modelspace().add_hatch(dxfattribs={"handle": "A1"}),
+    "mesh": lambda document: document.modelspace().add_polyface(dxfattribs={"handle": "A1"}),
+    "arcs": lambda document: document.modelspace().add_lwpolyline(
+        [(0, 0, 0.5), (1, 0, 0), (1, 1, 0)], format="xyb", close=True, dxfattribs={"handle": "A1"}
+    ),
+    "upright": lambda document: document.modelspace().add_lwpolyline(
+        UNIT, close=True, dxfattribs={"handle": "A1", "extrusion": (1.0, 0.0, 0.0)}
+    ),
+    "layer off": lambda document: hidden(document, "off", handle="A1"),
+    "layer frozen": lambda document: hidden(document, "freeze", handle="A1"),
+    "invisible": lambda document: hidden(document, "on", handle="A1", invisible=1),
+    "missing block": lambda document: document.modelspace().add_blockref("gone", (0, 0), dxfattribs={"handle": "A1"}),
+    "line in a block": lambda document: [
+        document.blocks.new("frame").add_line((0, 0), (1, 1)),
+        document.modelspace().add_blockref("frame", (0, 0), dxfattribs={"handle": "A1", "layer": "pier"}),
+    ],
+    "text alone": lambda document: document.modelspace().add_text("wall"),
+}
+
+
+@pytest.mark.parametrize("draw", NO_BLOCKS.values(), ids=NO_BLOCKS)
+def test_what_may_be_a_block_and_cannot_be_read_is_refused(
+    tmp_path: Path, dxf: Any, golden: Golden, draw: Callable[[Any], object]
+) -> None:
+    draw(dxf)
+    with pytest.raises(DrawingError) as caught:
+        read_drawing(saved(tmp_path, dxf))
+    golden(str(caught.value))
+
+
+def test_annotations_are_counted_and_said(tmp_path: Path, dxf: Any, golden: Golden) -> None:
+    space = dxf.modelspace()
+    space.add_lwpolyline(UNIT, close=True)
+    for text in ("north", "south"):
+        space.add_text(text)
+    space.add_linear_dim(base=(0, 2), p1=(0, 0), p2=(1, 0))
+    saved(tmp_path, dxf)
+    golden("\n".join(implausible_values(loaded(tmp_path))))
+
+
+@pytest.mark.parametrize(("code", "unit", "width"), [(6, None, 1.0), (2, None, 0.3048), (0, None, 1.0), (2, 0.5, 0.5)])
+def test_the_unit_of_a_dxf_file_is_taken_or_compared_with_that_given(
+    tmp_path: Path, dxf: Any, golden: Golden, code: int, unit: float | None, width: float
+) -> None:
+    dxf.header["$INSUNITS"] = code
+    dxf.modelspace().add_lwpolyline(UNIT, close=True)
+    saved(tmp_path, dxf)
+    scenario = load_scenario(tmp_path / "scene.toml", {} if unit is None else {"structures.0.unit": unit})
+    assert place_bodies(scenario)[0].size_x == pytest.approx(width)
+    golden("\n".join(implausible_values(scenario)))
+
+
+def test_parts_of_a_feature_have_names_of_their_own_and_numbers_are_names(tmp_path: Path) -> None:
+    both = {"type": "MultiPolygon", "coordinates": [[SQUARE], [WEDGE]]}
+    pair = {"type": "Feature", "properties": {"name": "pair", "fixed": True}, "geometry": both}
+    alone = {"type": "MultiPolygon", "coordinates": [[[[x + 5, y] for x, y in SQUARE]]]}
+    written(tmp_path, collection(pair, {"type": "Feature", "properties": {"name": 7}, "geometry": alone}))
+    assert [(one.name, one.fixed) for one in place_bodies(loaded(tmp_path))] == [
+        ("pair-1", True), ("pair-2", True), ("7", False)
+    ]  # fmt: skip
+
+
+def test_degrees_are_metres_only_where_that_is_said(tmp_path: Path) -> None:
+    far = [[11.5 + 1e-5 * x, 48.1 + 1e-5 * y] for x, y in SQUARE]
+    written(tmp_path, collection(feature(far)))
+    assert place_bodies(loaded(tmp_path))[0].size_x == pytest.approx(1e-7)
+    (tmp_path / "scene.toml").write_text(TEXT.replace(', unit = "1 cm"', ""))
+    with pytest.raises(ScenarioError, match=r"\(11\.5, 48\.1\) to \(11\.50001, 48\.10001\) look like degrees"):
+        loaded(tmp_path)
+    for near in ([[0.01 * x, 0.01 * y] for x, y in SQUARE], [[x + 100.0, y] for x, y in SQUARE]):
+        written(tmp_path, collection(feature(near)))
+        (tmp_path / "scene.toml").write_text(TEXT.replace(', unit = "1 cm"', ""))
+        loaded(tmp_path)
+
+
+def test_heights_that_are_left_out_are_said(tmp_path: Path) -> None:
+    written(tmp_path, collection(feature([[*point, 3.0] for point in SQUARE])))
+    (warning,) = implausible_values(loaded(tmp_path))
+    assert warning.startswith("wall.geojson: third coordinates of 5 points are not read")
 
 
 def test_only_points_within_straight_edges_are_left_out() -> None:

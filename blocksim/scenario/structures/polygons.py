@@ -1,49 +1,35 @@
 """Blocks by their corners where they are: written out, or from polygons in GeoJSON or closed polylines in DXF."""
 
-import json
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, Self
 
-from pydantic import ValidationInfo, model_validator
+from pydantic import ModelWrapValidatorHandler, PrivateAttr, ValidationError, ValidationInfo, model_validator
 
 from blocksim.errors import BlocksimError
 from blocksim.extras import load_module
-from blocksim.scenario import geometry, input_files, units as q
+from blocksim.scenario import geometry, input_files, mistakes, units as q
 from blocksim.scenario.models.base import Identifier, Table, setting, table_path
 from blocksim.scenario.models.geometry import COUNTS, Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure
+from blocksim.scenario.structures.drawings import (
+    Drawing,
+    DrawingError,
+    DrawingOutline,
+    place_text,
+    read_geojson,
+    simplify,
+)
+from blocksim.scenario.structures.dxf import DXF, read_dxf
 
 MOST_BYTES = 20 * input_files.MEGABYTE
 MOST_OUTLINES, MOST_CORNERS = 2000, 16_000
 """In a drawing; the scenario that is kept with the results has them all, and a scenario has a megabyte at most."""
-STRAY = 1e-6
-"""Distance of a point from the line through its neighbours, in sizes of the block, up to which it is left out."""
-DXF = "dxf"
-DXF_APPLICATION = "BLOCKSIM"
-"""Of the extended data of a polyline: the name of a block (text), and whether it is fixed (integer)."""
-DXF_TEXT, DXF_INTEGER = 1000, 1070  # group codes
-FARTHEST = 1e12
-COLLECTIONS = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
-DEEPEST = 20
 DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
 """What readers raise for a file that is no drawing."""
 
 
-class DrawingOutline(NamedTuple):
-    """One outline of a drawing, its coordinates as they are there."""
-
-    outline: list[geometry.Corner]
-    name: str  # for messages
-    properties: Mapping[str, Any]  # block, fixed, name
-
-
-class DrawingError(ValueError):
-    """A drawing that cannot be read, or an outline in it that no block can have; the text says which."""
-
-
-def read_drawing(path: Path) -> list[DrawingOutline]:
+def read_drawing(path: Path) -> Drawing:
     """Return the outlines in a drawing; points within straight edges are left out.
 
     Raises DrawingError, and UnavailableError for DXF without its package.
@@ -53,109 +39,23 @@ def read_drawing(path: Path) -> list[DrawingOutline]:
     damage = DAMAGE if ezdxf is None else (ezdxf.DXFError, *DAMAGE)
     try:
         content = input_files.read_limited(path, MOST_BYTES)  # no file that is larger, no pipe
-        if ezdxf is not None:
-            found = [*_polylines(ezdxf.readfile(path).modelspace())]
-        else:
-            found = [*_polygons(json.loads(content), "", {}, DEEPEST)]
+        found = read_geojson(content) if ezdxf is None else read_dxf(ezdxf.readfile(path))
     except DrawingError:
         raise
     except BlocksimError as error:
         raise DrawingError(str(error)) from None
     except damage as error:
         raise DrawingError(f"not a {'DXF' if is_dxf else 'GeoJSON'} file: {str(error)[:100]}") from None
-    if not found:
+    outlines = found.outlines
+    if not outlines:
         raise DrawingError("no closed polyline in it" if is_dxf else "no polygon in it")
-    if len(found) > MOST_OUTLINES or sum(len(one.outline) for one in found) > MOST_CORNERS:
+    if len(outlines) > MOST_OUTLINES or sum(len(one.outline) for one in outlines) > MOST_CORNERS:
         most = f"at most {MOST_OUTLINES} with {MOST_CORNERS} corners are allowed"
-        raise DrawingError(f"{len(found)} outlines are too many; {most}")
-    found = [one._replace(outline=simplify(one.outline)) for one in found]
-    for one in found:
-        for number, message in geometry.faults(one.outline):
-            place = "" if number is None else ", corner ({:g}, {:g})".format(*one.outline[number])
-            raise DrawingError(f"{one.name}{place}: {message}")
-    return found
+        raise DrawingError(f"{len(outlines)} outlines are too many; {most}")
+    return found._replace(outlines=[one._replace(outline=simplify(one.outline)) for one in outlines])
 
 
-def simplify(points: Sequence[geometry.Corner]) -> list[geometry.Corner]:
-    """Return an outline without points that repeat or lie within a straight edge, and not closed."""
-    corners = [point for number, point in enumerate(points) if point != points[(number + 1) % len(points)]]
-    low, high = geometry.box_of(corners) if corners else ((0.0, 0.0), (0.0, 0.0))
-    near = STRAY * math.dist(low, high)
-    number = 0
-    while number < len(corners) > geometry.FEWEST:
-        before, here, after = corners[number - 1], corners[number], corners[(number + 1) % len(corners)]
-        (x, y), (u, v) = ((x1 - before[0], y1 - before[1]) for x1, y1 in (after, here))
-        length = math.hypot(x, y)
-        if length > 0.0 and abs(x * v - y * u) <= near * length and 0.0 <= x * u + y * v <= length * length:
-            corners.pop(number)
-        else:
-            number += 1
-    return corners
-
-
-def _polygons(node: Any, name: str, properties: Mapping[str, Any], depth: int) -> Iterator[DrawingOutline]:
-    """Yield the polygons of a part of a file; `name` is that part in messages, empty for the whole file."""
-    place = f"{name}: " if name else ""
-    kind = node.get("type") if isinstance(node, dict) else None
-    if depth == 0:
-        raise DrawingError("collections are nested too deeply")
-    if kind is None:
-        raise DrawingError(f"{place}it has no type" if name else "not a GeoJSON file: it has no type")
-    if kind in COLLECTIONS:
-        for number, part in enumerate(_part(node, COLLECTIONS[kind], list, place), start=1):
-            inner = f"feature {number}" if kind == "FeatureCollection" else f"geometry {number}"
-            yield from _polygons(part, inner, properties, depth - 1)
-    elif kind == "Feature":
-        own = node.get("properties") or {}
-        if not isinstance(own, dict):
-            raise DrawingError(f"{place}its properties are no names with values")
-        yield from _polygons(_part(node, "geometry", dict, place), name, own, depth - 1)
-    elif kind in ("Polygon", "MultiPolygon"):
-        coordinates = _part(node, "coordinates", list, place)
-        for rings in [coordinates] if kind == "Polygon" else coordinates:
-            if not rings:
-                raise DrawingError(f"{place}a polygon without corners")
-            if len(rings) > 1:
-                holes = "a hole" if len(rings) == 2 else f"{len(rings) - 1} holes"
-                raise DrawingError(f"{place}a polygon with {holes}; blocks have none")
-            yield DrawingOutline([_point(point) for point in rings[0]], name or "polygon", properties)
-    else:
-        raise DrawingError(f"{place}{q.toml(kind)} is not a polygon")
-
-
-def _part(node: Mapping[str, Any], key: str, kind: type, place: str) -> Any:
-    """Return what a part of a file has under a key, of the kind that belongs there."""
-    found = node.get(key)
-    if not isinstance(found, kind):
-        raise DrawingError(f"{place}it has no {key}")
-    return found
-
-
-def _point(values: Any) -> geometry.Corner:
-    x, y = (float(value) for value in values[:2])
-    if not (abs(x) < FARTHEST and abs(y) < FARTHEST):
-        raise DrawingError(f"({x:g}, {y:g}) is not a place")
-    return x, y
-
-
-def _polylines(space: Any) -> Iterator[DrawingOutline]:
-    for entity in space.query("LWPOLYLINE POLYLINE"):
-        name = f"polyline {entity.dxf.handle} in layer {entity.dxf.layer}"
-        is_light = entity.dxftype() == "LWPOLYLINE"
-        places = entity.get_points("xy") if is_light else [(place.x, place.y) for place in entity.points()]
-        points = [_point(place) for place in places]
-        if not (entity.closed if is_light else entity.is_closed) and points[:1] != points[-1:]:
-            continue
-        if entity.has_arc:
-            raise DrawingError(f"{name}: has arcs; blocks have straight edges")
-        layer = {} if entity.dxf.layer == "0" else {"block": entity.dxf.layer}
-        tags = entity.get_xdata(DXF_APPLICATION) if entity.has_xdata(DXF_APPLICATION) else ()
-        values = {tag.code: tag.value for tag in tags}  # as `blocksim export` has written them
-        names = {"name": str(values[DXF_TEXT])} if DXF_TEXT in values else {}
-        fixed = {"fixed": bool(values[DXF_INTEGER])} if DXF_INTEGER in values else {}
-        yield DrawingOutline(points, name, layer | names | fixed)
-
-
+AS_READ = "; results keep the blocks as they were read"
 MOST_SHRINK = 0.01  # of the least width of a block
 
 
@@ -172,11 +72,45 @@ class DrawnBlock(Table):
             raise q.invalid(message, "outline", *(() if number is None else (number,)))
 
 
+def _blocks_in(path: Path, given: float | None) -> tuple[Drawing, tuple[DrawnBlock, ...]]:
+    """Return a drawing and its blocks, in a unit (m) or in that of the drawing. Raises DrawingError."""
+    drawing = read_drawing(path)
+    if given is None and drawing.degrees:
+        raise DrawingError(drawing.degrees)
+    name, own = drawing.unit or ("", 1.0)
+    unit, remarks = given or own, [*drawing.remarks]
+    if name and unit != own:
+        remarks.append(f"$INSUNITS says {name}, but unit = {unit:g} m is taken")
+    elif name and given is None and unit != 1.0:
+        remarks.append(f"coordinates are taken as {name}, as $INSUNITS says")
+    blocks = tuple(_drawn_block(one, unit) for one in drawing.outlines)
+    return drawing._replace(remarks=tuple(f"{path.name}: {text}{AS_READ}" for text in remarks)), blocks
+
+
+def _drawn_block(one: DrawingOutline, unit: float) -> DrawnBlock:
+    """Return the block of an outline in a unit (m). Raises DrawingError with its place."""
+    if "material" in one.properties and "block" not in one.properties:
+        raise DrawingError(f"{one.name}: material is not read; name a block, which has one")
+    known = {key: one.properties.get(key) for key in ("block", "fixed", "name")}
+    known = {key: value for key, value in known.items() if value is not None}
+    data = {"outline": tuple((x * unit, y * unit) for x, y in one.outline), **known}
+    try:
+        return DrawnBlock.model_validate(data)
+    except ValidationError as error:
+        first = mistakes.mistakes_of(error, data)[0]
+        key, *corner = first.path
+        if key == "outline":
+            key = f"corner {place_text(*one.outline[int(corner[0])])}" if corner else ""
+        raise DrawingError(f"{', '.join(filter(None, (one.name, str(key))))}: {first.message}") from None
+
+
 class Polygons(PolygonStructure):
     """Blocks in `cells`, or in a GeoJSON or DXF file, of which results keep the blocks and not the file.
 
-    A polygon of GeoJSON may have the properties block, fixed and name; the layer of a DXF polyline other than 0 is the
-    name of its block. The block has the material, and [pairs] of materials say how joints behave.
+    A polygon of GeoJSON may have the properties block, fixed and name; several of a feature are NAME-1, NAME-2. The
+    layer of a DXF polyline other than 0 is the name of its block; inserted blocks are read at all levels. What may be
+    the outline of a block and cannot be read is refused by entity, layer and handle; annotations are counted. The block
+    has the material, and [pairs] of materials say how joints behave.
     """
 
     kind: Literal["polygons"] = setting("kind of structure")
@@ -184,33 +118,43 @@ class Polygons(PolygonStructure):
         "blocks, each with its outline; give these or table", (), alias="cells"
     )
     table: str | None = setting("GeoJSON or DXF file with an outline for each block", None)
-    unit: q.PositiveLength = setting("unit of the coordinates in the file", 1.0)
+    unit: q.PositiveLength = setting("unit of the coordinates in the file (default: $INSUNITS of DXF, else metres)", 1.0)
     in_place: bool = setting("true keeps all coordinates, whatever left and bottom are", default=False)
     shrink: q.NonNegativeLength = setting(
         "how far every edge moves inwards, so that rounded coordinates, or blocks at rest, do not overlap", 0.0
     )
 
-    @model_validator(mode="before")
+    _drawing: Drawing = PrivateAttr(Drawing([]))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was not read of its drawing, or decided by it."""
+        return self._drawing.remarks
+
+    def place_of(self, number: int) -> str:
+        """Return where a block is in its drawing, for messages; empty for one of `cells`."""
+        return f"{self._drawing.outlines[number].name}: " if self._drawing.outlines else ""
+
+    @model_validator(mode="wrap")
     @classmethod
-    def _read(cls, data: object, info: ValidationInfo) -> object:
+    def _read(cls, data: object, handler: ModelWrapValidatorHandler["Polygons"], info: ValidationInfo) -> "Polygons":
         if not isinstance(data, Mapping) or "table" not in data:
-            return data
+            return handler(data)
         if "cells" in data:
             raise q.invalid("table and cells are both given; keep one of them", "table")
-        unit = q.Quantity(q.LENGTH, above=0.0).read(data.get("unit", 1.0))
+        unit = q.Quantity(q.LENGTH, above=0.0).read(data["unit"]) if "unit" in data else None
         path = table_path(data["table"], (info.context or {}).get("folder"), "wall.geojson", "table")
         try:
-            drawn = read_drawing(path)
+            drawing, cells = _blocks_in(path, unit)
         except DrawingError as error:
             raise q.invalid(f"{path.name}: {error}", "table") from None
-        cells = []
-        for one in drawn:
-            if "material" in one.properties and "block" not in one.properties:
-                raise q.invalid(f"{path.name}: {one.name}: material is not read; name a block, which has one", "table")
-            known = {key: one.properties.get(key) for key in ("block", "fixed", "name")}
-            known = {key: value for key, value in known.items() if value is not None}
-            cells.append({"outline": tuple((x * unit, y * unit) for x, y in one.outline), **known})
-        return {**{key: value for key, value in data.items() if key not in ("table", "unit")}, "cells": tuple(cells)}
+        rest = {key: value for key, value in data.items() if key not in ("table", "unit")}
+        return handler({**rest, "cells": cells}).drawn_in(drawing)
+
+    def drawn_in(self, drawing: Drawing) -> Self:
+        """Keep where its blocks come from, until it is written."""
+        self._drawing = drawing
+        return self
 
     def _check(self) -> None:
         if not 0 < len(self.cells_given) <= MOST_OUTLINES:

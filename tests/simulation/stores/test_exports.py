@@ -57,7 +57,7 @@ def test_geojson_has_the_last_outlines_with_their_blocks(tmp_path: Path) -> None
     data = json.loads(path.read_text())
     assert [one["properties"]["name"] for one in data["features"]] == ["1", "2", "3"]
     assert data["features"][2]["properties"]["rotation_deg"] == pytest.approx(-90.0)
-    for number, (one, count) in enumerate(zip(read_drawing(path), (3, 4, 3), strict=True)):
+    for number, (one, count) in enumerate(zip(read_drawing(path).outlines, (3, 4, 3), strict=True)):
         assert np.array(one.outline) == pytest.approx(1e-3 * corners(FRAMES, 4)[number, :count])
         assert one.properties["block"] == place_bodies(SCENARIO)[number].block
 
@@ -66,7 +66,7 @@ def test_removed_blocks_and_frames_that_are_not_finite_are_not_drawn(tmp_path: P
     x, vx = FRAMES.x.copy(), FRAMES.vx.copy()
     x[4, 0], vx[3, 1] = np.nan, np.nan
     assert write_geojson(tmp_path / "end.geojson", replace(FRAMES, x=x, vx=vx), SCENARIO) == 2
-    first = read_drawing(tmp_path / "end.geojson")[0]
+    first = read_drawing(tmp_path / "end.geojson").outlines[0]
     assert np.array(first.outline) == pytest.approx(1e-3 * corners(FRAMES, 3)[0, :3])
     for write in (write_geojson, write_vtkhdf):
         with pytest.raises(InvalidInputError, match="no frame to export"):
@@ -81,7 +81,7 @@ def test_dxf_has_them_with_blocks_names_and_what_is_fixed(tmp_path: Path) -> Non
     frames = polygons(toppling(4, steps=5), WEDGE)
     assert write_dxf(path, frames, scenario) == 4
     refuse_foreign(path)  # it is one of blocksim
-    read, placed = read_drawing(path), place_bodies(scenario)
+    read, placed = read_drawing(path).outlines, place_bodies(scenario)
     assert np.array(read[0].outline) == pytest.approx(1e-3 * corners(frames, 4)[0, :3])
     told = [tuple(one.properties[name] for name in ("block", "name", "fixed")) for one in read]
     assert told == [(body.block, body.name, body.fixed) for body in placed]
