@@ -39,11 +39,13 @@ class ScenarioInput:
             raise ScenarioError([document.problem(mistakes.Mistake(("contact", "skin"), str(error)))]) from None
 
 
-def warn_of_values(scenarios: Iterable[Scenario], screen: command_line.Screen) -> None:
-    """Warn of values that are allowed but implausible, of each once."""
+def warn_of_values(scenarios: Iterable[Scenario], screen: command_line.Screen) -> list[str]:
+    """Warn of values that are allowed but implausible, of each once, and return the warnings."""
     found = () if screen.silent else (text for one in scenarios for text in check.implausible_values(one))
-    for text in dict.fromkeys(found):
+    shown = list(dict.fromkeys(found))
+    for text in shown:
         screen.note(f"warning: {text}")
+    return shown
 
 
 DryRun = Annotated[bool, Option("Print number of cases, cost and size without running anything.")]

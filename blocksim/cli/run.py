@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
 from itertools import islice
@@ -13,7 +13,6 @@ import typer
 
 from blocksim.cli import command_line, compare, output, prepare, progress
 from blocksim.options import Option
-from blocksim.scenario import after_end
 from blocksim.simulation import Result, files, loop, observables, rest_state, trajectory
 from blocksim.simulation.run import RunCallbacks
 from blocksim.study import compare as judgement, rows, run
@@ -54,7 +53,7 @@ def run_command(
 
     listener = RunCallbacks(on_start=start) if screen.silent else RunCallbacks(output.note, start)
     with source.built() as ready, progress.run_progress(quiet=screen.silent) as on_progress:
-        prepare.warn_of_values([ready], screen)
+        shown = prepare.warn_of_values([ready], screen)
         out = options.out or files.default_folder(ready)
         if context.obj is not None:  # imports and compiling are waited for too
             over = time.monotonic() - context.obj
@@ -68,7 +67,7 @@ def run_command(
                 ) from None
     # SIGHUP reports that the terminal is lost
     with nullcontext() if result.status == rows.FINISHED else suppress(OSError):
-        screen.show(_report(result))
+        screen.show(_report(result, shown))
     raise typer.Exit(result.summary.exit_code)
 
 
@@ -82,15 +81,18 @@ def _page(folder: Path) -> Iterator[None]:
         yield
 
 
-def _report(result: Result) -> command_line.Report:
-    """Return the final table, with the measured ranges if the scenario names an experiment."""
+def _report(result: Result, shown: Sequence[str]) -> command_line.Report:
+    """Return the final table, with the measured ranges if the scenario names an experiment.
+
+    Warnings that were `shown` before the run are not repeated.
+    """
     endings = {name: trajectory.rows_of(table) for name, table in result.endings.items()}
     summary = result.summary.model_dump()
     is_whole = result.status == rows.FINISHED
     return command_line.Report(
         _answer_lines(result),
         {"folder": str(result.folder), "final": trajectory.rows_of(result.columns), **endings, "summary": summary},
-        before=_end_lines(result),
+        before=_end_lines(result, shown),
         notes=[f"results: {result.folder}"] if is_whole else [],
         always=() if is_whole else _way_on(result),
         code=result.summary.exit_code,
@@ -128,7 +130,7 @@ def _answer_lines(result: Result) -> list[str]:
     return lines
 
 
-def _end_lines(result: Result) -> Iterator[str]:
+def _end_lines(result: Result, shown: Sequence[str]) -> Iterator[str]:
     """Yield how a run went, and a line that separates this from the answer."""
     summary = result.summary
     yield f"{result.name}: {result.status} ({result.reason}) at {summary.simulated_time_s:.3f} s of simulated time"
@@ -151,6 +153,5 @@ def _end_lines(result: Result) -> Iterator[str]:
         )
     if moved is not None and summary.reason != loop.REST.reason and moved.fastest_m_s > result.scenario.time.rest_speed:
         yield f"not at rest: block {moved.fastest_block} at {moved.fastest_m_s:.2g} m/s"
-    before = set(after_end.cut_off(result.scenario))  # with the values that are hardly meant
-    yield from (f"warning: {text}" for text in summary.warnings if text not in before)
+    yield from (f"warning: {text}" for text in summary.warnings if text not in shown)
     yield ""

@@ -9,7 +9,7 @@ from typing import get_args
 
 from pydantic import ValidationError
 
-from blocksim.scenario import after_end, geometry, mistakes, overrides, placement, start, units
+from blocksim.scenario import after_end, geometry, mistakes, overlap, overrides, placement, start, support, units
 from blocksim.scenario.models import base, contact, study, timeline
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.structures import polygons
@@ -132,7 +132,8 @@ def implausible_values(scenario: Scenario) -> list[str]:
     """Return a warning for each value that looks like one in another unit, of frictions swept ones too.
 
     Also for what was not read of drawings, for soils of whose width or height no whole number of particles takes all,
-    with a finer spacing that does, and for what the end of the run cuts off.
+    with a finer spacing that does, for what the end of the run cuts off, and for blocks that nothing supports at the
+    start.
     """
     warnings = []
     for name, material in scenario.materials.items():
@@ -169,7 +170,8 @@ def implausible_values(scenario: Scenario) -> list[str]:
                     f"{overrides.format_key(('soils', soil.name, 'spacing'))} = {1e3 * soil.spacing:.4g} mm fills "
                     f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
                 )
-    return [*warnings, *after_end.cut_off(scenario)]
+    loose = support.support_warning(scenario)
+    return [*warnings, *after_end.cut_off(scenario), *([loose] if loose else [])]
 
 
 STRONG_RESTITUTION = 0.5  # beyond which simultaneous impacts were seen to create energy
@@ -177,7 +179,7 @@ BESIDE = 0.01  # of the smallest side: blocks no farther apart touch
 
 
 def _impacts(scenario: Scenario) -> Iterator[str]:
-    """Yield that contact.impacts has no effect, or that another value of it suits rows that pass blows on."""
+    """Yield that contact.impacts has no effect, or that blocks touch whose restitution asks for another value."""
     if not scenario.time.has_rigid_contacts:
         if scenario.contact.impacts == "sequential":
             yield 'contact.impacts has no effect: contacts are springs; time.scheme = "nonsmooth" has rigid ones'
@@ -186,14 +188,13 @@ def _impacts(scenario: Scenario) -> Iterator[str]:
     restitution = max(scenario.contact.restitution.block_block, *pairs, 0.0)
     if restitution <= STRONG_RESTITUTION or scenario.contact.impacts == "sequential":
         return
-    placed = placement.place_bodies(scenario)
-    free = [k for k, body in enumerate(placed) if not body.fixed]
-    near = BESIDE * placement.smallest_width(placed[k] for k in free)
-    if touching := overlap.first_within(placed, free, near):
-        names = " and ".join(placed[k].name for k in touching)
+    free = [body for body in placement.place_bodies(scenario) if not body.fixed]
+    one, other, _ = overlap.pairs_within(overlap.Outlines.of(free), BESIDE * placement.smallest_width(free))
+    if one.size:
         yield (
-            f"restitution {restitution:g} between blocks that touch ({names}): simultaneous impacts neither pass blows on "
-            'from block to block nor bound the energy; contact.impacts = "sequential" does'
+            f"restitution {restitution:g} between blocks that touch ({free[one[0]].name} and {free[other[0]].name}): "
+            "simultaneous impacts pass no blow on from block to block, and may create energy; set "
+            'contact.impacts = "sequential"'
         )
 
 

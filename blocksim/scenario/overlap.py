@@ -136,6 +136,34 @@ def _least_reach(ones: Floats, others: Floats) -> Floats:
     return least
 
 
+def pairs_within(outlines: Outlines, reach: float) -> tuple[Integers, Integers, Floats]:
+    """Return the indices of all pairs of outlines that are no farther apart than a reach (m), and their distances."""
+    wider = outlines._replace(half_x=outlines.half_x + 0.5 * reach, half_y=outlines.half_y + 0.5 * reach)
+    found: list[tuple[Integers, Integers, Floats]] = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))]
+    for first, second in near_pairs(wider):
+        depth = penetration(outlines.some(first), outlines.some(second))  # apart no more than the distance
+        are_boxes = (outlines.kinds[first] == RECTANGLE) & (outlines.kinds[second] == RECTANGLE)
+        gaps = np.where((depth > 0.0) | (are_boxes & (depth > -placement.TOLERANCE)), 0.0, -depth)
+        apart = np.flatnonzero(((gaps > 0.0) | ~are_boxes & (depth == 0.0)) & (gaps <= reach))
+        for begin in range(0, apart.size, POLYGONS_AT_ONCE):
+            some = apart[begin : begin + POLYGONS_AT_ONCE]
+            corners, behind = outlines.some(first[some]).corners(), outlines.some(second[some]).corners()
+            gaps[some] = np.minimum(_least_distance(corners, behind), _least_distance(behind, corners))
+        found.append((first[gaps <= reach], second[gaps <= reach], gaps[gaps <= reach]))
+    one, other, gaps = (np.concatenate(part) for part in zip(*found, strict=True))
+    return one, other, gaps
+
+
+def _least_distance(ones: Floats, others: Floats) -> Floats:
+    """Return the least distances (m) of the edges of ones from the corners (m, k, 2) of others."""
+    along = np.roll(ones, -1, axis=1) - ones
+    beyond = others[:, None] - ones[:, :, None]
+    square = np.maximum(np.sum(along * along, axis=-1), np.finfo(np.float64).tiny)
+    share = np.clip(np.einsum("mec,mekc->mek", along, beyond) / square[..., None], 0.0, 1.0)
+    least: Floats = np.linalg.norm(beyond - share[..., None] * along[:, :, None], axis=-1).min(axis=(1, 2))
+    return least
+
+
 def overlapping_pairs(
     bodies: Sequence[placement.PlacedBody], segments: Sequence[placement.PlacedSegment] | None = None
 ) -> Iterator[tuple[int, int, float]]:

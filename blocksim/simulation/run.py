@@ -15,7 +15,7 @@ from blocksim.errors import OutputError
 from blocksim.kernels.common import arrays, compiler
 from blocksim.kernels.common.tolerances import MOST_ROUNDS
 from blocksim.options import silent
-from blocksim.scenario import PlacedBody, Scenario, after_end, events, motion, placement, scenario_hash
+from blocksim.scenario import PlacedBody, Scenario, check, events, motion, placement, scenario_hash
 from blocksim.scenario.models.motion import Pulse
 from blocksim.scenario.models.timeline import Nonsmooth
 from blocksim.simulation import balance, checkpoint, files, instruments, loop, observables, provenance, results, schemes
@@ -307,10 +307,10 @@ def _convergence_warnings(scenario: Scenario, found: results.Convergence | None)
 def _warnings(
     scenario: Scenario, placed: Sequence[PlacedBody], ended: loop.LoopResult, settled: results.RestState | None
 ) -> Iterator[str]:
+    yield from check.implausible_values(scenario)
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > balance.RESIDUAL_PROMISE:
         yield f"relative energy error {residual:.1e}, above {balance.RESIDUAL_PROMISE:g}"
-    yield from after_end.cut_off(scenario)
     if ended.outcome.reason.startswith(loop.STOPPED):
         yield "the run stopped after the fall, while blocks were moving: the final table is not that of rest"
     if every < (1.0 - memory.ROUNDING) * float(ended.scene.world.controls[0].step):

@@ -21,11 +21,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 
-import numpy as np
-
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.options import Option, Overwrite, silent, takes
-from blocksim.scenario import Document, Scenario, overlap, overrides, place_bodies, place_segments, scenario_hash, units
+from blocksim.scenario import Document, Scenario, overrides, place_bodies, scenario_hash, support, units
 from blocksim.scenario.models import study, timeline
 from blocksim.scenario.placement import smallest_width
 from blocksim.simulation.provenance import code_hash
@@ -50,7 +48,7 @@ PARTS = 3
 HALVINGS = 2  # of the spacing of a scan, beside a peak
 OUTWARD = 2.0  # widths of what is known, by which a search near a value goes on beyond it
 FLOOR = 1e-6  # of the range: brackets about zero get no narrower
-NEAR = 0.01  # of the smallest side of a block: what is farther from all others is to drop
+NEAR = 0.01  # of the smallest side of a block: what is farther from all that carries it is to drop
 SCANNED = 9
 MOST_SCANNED = MOST_VALUES = 1000
 TOLERANCE = 1e-3
@@ -272,23 +270,11 @@ def next_near(span: SearchRange, known: Mapping[Number, Kind], near: Change[Kind
 
 
 def is_sustained(scenario: Scenario) -> bool:
-    """Return True where loads are the same from time zero on, nothing moves then, and no block is to drop.
-
-    A free block is to drop that has no other, no wall and not the ground near it.
-    """
+    """Return True where loads are the same from time zero on, nothing moves then, and no block is to drop."""
     if why_not_sustained(scenario):
         return False
-    placed, segments = place_bodies(scenario), place_segments(scenario)
-    outlines = overlap.Outlines.of(placed)
-    if segments:
-        outlines = outlines.and_pieces(overlap.Outlines.along(segments))
-    near = NEAR * smallest_width(placed)
-    for number in (number for number, body in enumerate(placed) if not body.fixed):
-        others = np.delete(np.arange(outlines.kinds.size), number)
-        depth = overlap.penetration(outlines.some(np.full(others.size, number)), outlines.some(others))
-        if not (depth > -near).any() and outlines.bottom[number] > near:
-            return False
-    return True
+    dropped, _ = support.unsupported(scenario, NEAR * smallest_width(place_bodies(scenario)))
+    return not dropped
 
 
 def numeric_levels(document: Document, given: Variations, option: str) -> tuple[Head, dict[float, object]]:

@@ -25,6 +25,7 @@ from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.options import silent
 from blocksim.scenario import input_files, scenario_hash
+from blocksim.scenario.structures.polygons import AS_READ
 from blocksim.simulation import Watcher, checkpoint, files, instruments, observables, provenance, results, simulate
 from blocksim.simulation.trajectory import csv_text
 from blocksim.study import answer, manifest, plan, run_folder, sweep, sweep_folder
@@ -67,9 +68,9 @@ def differing_entries(
         wanted |= {name: getattr(then, name) for name in HASHES}
     names += [name for name in OF_THE_MOTION if same_code or stored.get(name)]
     found = [one for name in names for one in apart(files.SUMMARY, name, stored.get(name), wanted[name])]
-    # the warnings are those of now, after what was reported when the run went on or began again
+    # the warnings are those of now, after what was reported when the run went on or began again, or read a drawing
     before = then.warnings[: len(then.warnings) - len(now.warnings)]
-    is_allowed = bool(then.resumed_from) or all(text.endswith(checkpoint.STARTS_ANEW) for text in before)
+    is_allowed = bool(then.resumed_from) or all(text.endswith((checkpoint.STARTS_ANEW, AS_READ)) for text in before)
     if whole and not (is_allowed and (*before, *now.warnings) == then.warnings):
         found.append(EntryDifference(files.SUMMARY, "warnings", list(then.warnings), list(now.warnings)))
     if (folder / files.DONE).is_file():  # the mark of the end must not contradict run.json

@@ -118,7 +118,7 @@ class Polygons(PolygonStructure):
         "blocks, each with its outline; give these or table", (), alias="cells"
     )
     table: str | None = setting("GeoJSON or DXF file with an outline for each block", None)
-    unit: q.PositiveLength = setting("unit of the coordinates in the file (default: $INSUNITS of DXF, else metres)", 1.0)
+    unit: q.PositiveLength = setting("unit of coordinates in the file (default: $INSUNITS of DXF, else metres)", 1.0)
     in_place: bool = setting("true keeps all coordinates, whatever left and bottom are", default=False)
     shrink: q.NonNegativeLength = setting(
         "how far every edge moves inwards, so that rounded coordinates, or blocks at rest, do not overlap", 0.0
