@@ -8,12 +8,13 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import command_line, prepare, progress
+from blocksim.cli import command_line, output, prepare, progress
 from blocksim.options import Option
 from blocksim.scenario.models.timeline import SPRINGS
 from blocksim.simulation.schemes import kernels_of
 from blocksim.study import answer, criterion, fragility, limit, limit_answer, limit_plan, rows
 from blocksim.study.plan import estimate_of
+from blocksim.world import describe
 
 ONE_CHANGE = (
     "for one change in the middle of the range, which nothing foretells; each further\n"
@@ -23,6 +24,7 @@ AT_ONCE = (
     "start.settle = false: loads that are applied suddenly shift limits of arches and walls by 0.2 to 4 %; leave it "
     "out, and every run begins at rest"
 )
+LEAST_SAID = 0.1  # s of a run
 
 
 def limit_command(
@@ -116,6 +118,9 @@ def _warn(plan: limit_plan.LimitPlan, screen: command_line.Screen) -> None:
     ends = [plan.scenario_at(value) for value in (plan.span.low, plan.span.high)]
     prepare.announce_compilation(kernels_of(ends[0]), quiet=screen.silent)
     prepare.warn_of_values(ends, screen)
+    seconds = output.duration(max(LEAST_SAID, *(describe.describe(one).seconds for one in ends)))
+    runs = f"about {plan.usual_runs} runs for each change in the range, {plan.most_runs} at most"
+    screen.note(f"forecast: {runs}; up to {seconds} each on one core")
     if not any(one.start.settle for one in ends) and all(map(limit_plan.is_sustained, ends)):
         screen.note(AT_ONCE)
 

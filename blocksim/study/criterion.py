@@ -4,8 +4,9 @@ Conditions are joined by commas, and all of them must hold. They name observable
 displacement of a centre from start to end, `turned` the largest rotation; `outcome` is one of stands, rocked back,
 rocking, slid, fell, several of them with "|" between.
 
-A run that meets all conditions but moves on at its end is undecided. A scene that does not come to rest before time
-zero (`start.settle`) falls.
+A run that meets all conditions but moves on at its end is undecided. So is what still rocks at its end, whatever the
+conditions, where a motion, a pulse or a velocity at the start has passed, as it may come to rest yet. A scene that does
+not come to rest before time zero (`start.settle`) falls.
 """
 
 import math
@@ -22,6 +23,7 @@ from blocksim.study.rows import FINISHED
 
 STANDS = "--stands"
 DEFAULT = "outcome = stands | rocked back"
+OF_MOVING_SUPPORTS = "outcome != fell"
 FORM = re.compile(r"\s*([a-z]+)\s*(<=|>=|!=|==?|<|>)\s*(.*?)\s*")
 UNITS = {  # of observables: kind, units in one of SI
     "mm": (q.LENGTH, 1e3),
@@ -52,6 +54,7 @@ class Criterion:
     text: str
     conditions: tuple[Callable[[Mapping[str, object]], bool], ...]
     least_moved: float | None = None  # m, the least displacement that any of them names
+    has_passed: bool = False  # what acts on blocks, so that those that rock at the end may come to rest yet
 
     def holds(self, row: Mapping[str, object]) -> bool:
         """Return True if a row of a finished run meets all conditions."""
@@ -63,6 +66,8 @@ class Criterion:
             return Stability.FALLS
         if row["status"] != FINISHED:
             return Stability.FAILED
+        if self.has_passed and row.get(observables.OUTCOME) == observables.Response.ROCKING:
+            return Stability.UNDECIDED
         if not self.holds(row):
             return Stability.FALLS
         return Stability.UNDECIDED if row.get(observables.MOVES_ON) else Stability.STANDS

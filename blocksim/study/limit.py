@@ -15,7 +15,8 @@ stiffness k. In a wall the part that topples turns as a whole, as the load leave
 standing side of a bracket is the shift. A structure that has moved, or rocked back, has turned otherwise too. Of that
 only a bound is known, if everything rests on one corner of the softest contact; and none where supports move: what
 impacts of a rocking block leave depends on the springs too, and a pulse that begins at its peak while springs carry
-none of it makes it slip too far, with the root of 1/stiffness (simulation/run.py).
+none of it makes it slip too far, with the root of 1/stiffness (simulation/run.py). There every run is long and no limit
+need be one of stiff contacts, so stiffer springs are searched when asked for alone.
 
 **Stiff contacts.** All that is linear in 1/k where it is small, and so is what it takes away from a limit: L(k) = L -
 a/k. Of two stiffnesses, one r times the other, L = (r L(r k) - L(k))/(r - 1). With a force k d^n a contact gives way as
@@ -45,7 +46,7 @@ from typing import Any
 from blocksim.errors import InvalidInputError, OutputError, StoppedEarlyError
 from blocksim.options import silent, takes
 from blocksim.scenario import Document, Scenario, Source, document_of, laws, motion, place_bodies, placement
-from blocksim.scenario.models import motion as motions, timeline
+from blocksim.scenario.models import timeline
 from blocksim.simulation import observables, provenance, rest_state, schemes
 from blocksim.study import limit_answer, limit_plan, manifest, sweep, sweep_folder
 from blocksim.study.answer import Study, without_cases
@@ -65,6 +66,7 @@ SLIDES = 0.01  # calibrated: of a bound, how far below it the estimate of joints
 BEYOND_ESTIMATE = 0.1  # calibrated: of the way from there to the bound, up to which they stand
 NO_STIFFER = "with springs {ratio:g} times as stiff there is no such limit in the range"
 NO_FINER = "with half the time step there is no such limit in the range"
+CUT = "not searched to the end, as that takes more than --most-runs"
 STILL_FAR = "limits of the last two stiffnesses are too far apart to be extrapolated well; give stiffer springs"
 STANDS = observables.Response.STANDS.value
 OnOther = Callable[[LimitPlan], None]
@@ -237,13 +239,8 @@ class StandingSide:
         """A bound of the share of a limit that springs take away, by their load and how slender blocks are."""
         scenario = self.scenario
         slender = slenderness(scenario)
-        is_late = (
-            isinstance(scenario.motion, motions.Pulse) and scenario.motion.is_abrupt and not motion.settles(scenario)
-        )
-        if self.give is not None and not is_late:
+        if self.give is not None:
             return max(self.give.share, 2.0 * math.radians(self.give.turn) / slender)
-        if is_late or (scenario.motion is not None and scenario.contact.stiffness_scale < 1.0):
-            return math.inf
         placed = place_bodies(scenario)  # the softest contact gives way under the weight of all free blocks
         weight = scenario.gravity * sum(body.mass for body in placed if not body.fixed)
         table = interactions_of(scenario, contact_classes(scenario, placed))
@@ -274,8 +271,9 @@ class StandingSide:
         if levels is not None:
             is_known = levels.stiff is not None or levels.problem
             return limit_answer.Margin(rest=rest, springs=0.0 if is_known else BEYOND * probed)
-        most = self.most_shift if self.give is None else self.give.share
-        return limit_answer.Margin(rest=rest, springs=most if math.isfinite(most) else 0.0)
+        if self.give is not None:
+            return limit_answer.Margin(rest=rest, springs=self.give.share)
+        return limit_answer.Margin(rest=rest, springs=0.0 if plan.moves_supports else self.most_shift)
 
 
 def slenderness(scenario: Scenario) -> float:
@@ -315,13 +313,14 @@ class _Search:
     stiffer: bool | None
     on_run: limit_plan.OnRun
     on_other: OnOther
+    count: int = 0  # of the values that were run
+    is_cut: bool = False  # by the most runs of the plan
     stiff_rows: dict[float, dict[Number, Row]] = field(default_factory=dict)  # by stiffness scale
     step_rows: dict[float, dict[Number, Row]] = field(default_factory=dict)  # by time step (s)
 
     def answer(self) -> limit_answer.LimitAnswer:
         """Return the answer, after all runs that it takes."""
         plan, folder = self.plan, self.runs.manifest.path.parent
-        has_islands = plan.scenario.motion is not None  # a value may fall between others that stand: supports move
         statics, near = (None, None) if plan.has_scan else self._foretold()
 
         def choose(rows: Rows) -> list[Number]:
@@ -331,7 +330,7 @@ class _Search:
                 changes = [(one.below, one.above) for one in limit_plan.changes_in(verdicts)]
                 if values or changes == [(near.below, near.above)]:
                     return values
-            known = rows.items() if has_islands else ()
+            known = rows.items() if plan.moves_supports else ()  # a value may fall between others that stand
             peaks = {at: float(str(row[observables.PEAK])) for at, row in known if observables.PEAK in row}
             return limit_plan.next_values(plan.span, plan.verdicts(rows), plan.tolerance, peaks)
 
@@ -340,7 +339,7 @@ class _Search:
         others, is_as_given = (self.stiff_rows, self.step_rows), self.stiffer is False
         return limit_answer.LimitAnswer.of(
             plan, folder, rows, brackets, *others, run=self.runs.new, is_as_given=is_as_given, statics=statics
-        )
+        ).model_copy(update={"is_cut": self.is_cut})
 
     def _foretold(self) -> tuple[dict[str, object] | None, Change[Stability] | None]:
         """Return the only value beyond which statics knows no equilibrium, and the side; and a bracket about it."""
@@ -374,9 +373,16 @@ class _Search:
         return changes[0] if len(changes) == 1 else near
 
     def _searched(self, plan: LimitPlan, choose: Callable[[Rows], list[Number]]) -> dict[Number, Row]:
-        """Go from round to round and return what it needed; rows of an earlier search are taken as they are."""
+        """Go from round to round and return what it needed; rows of an earlier search are taken as they are.
+
+        The first round of all is run however many values it has.
+        """
         rows: dict[Number, Row] = {}
-        while values := choose(rows):
+        while not self.is_cut and (values := choose(rows)):
+            if self.count and self.count + len(values) > plan.most_runs:
+                self.is_cut = True
+                break
+            self.count += len(values)
             wanted = {value: plan.settings(value) for value in values}
             rows |= self.runs.rows_of(wanted, lambda at, row: self.on_run(at, plan.criterion.verdict(row), row))
         return rows
@@ -392,7 +398,8 @@ class _Search:
         side = StandingSide(plan, change, rows)
         least, levels, half = max(SHIFT, plan.tolerance), None, None
         if is_corrected and can_be_stiffer(plan):
-            levels = self._levels(side, least) if self.stiffer or side.most_shift > least else None
+            is_needed = self.stiffer or (not plan.moves_supports and side.most_shift > least)
+            levels = self._levels(side, least) if is_needed else None
         elif is_corrected and not plan.scenario.time.has_springs and not plan.key.startswith("time."):
             half = self._half(change)
         margin = side.margin(levels, least, as_given=not is_corrected)
@@ -429,7 +436,7 @@ class _Search:
         stands = Stability.STANDS  # what moves on at the end without having fallen counts as standing here
         below, above = (stands if end is Stability.UNDECIDED else end for end in (near.below, near.above))
         near = replace(near, below=below, above=above)
-        if place not in known:
+        if place not in known and not self.is_cut:
             self.on_other(plan)
 
         def choose(rows: Rows) -> list[Number]:
@@ -439,8 +446,13 @@ class _Search:
 
         rows = self._searched(plan, choose)
         known.setdefault(place, {}).update(rows)
-        changes = limit_plan.changes_in(self.plan.verdicts(rows, stands))
+        changes = [] if self.problem else limit_plan.changes_in(self.plan.verdicts(rows, stands))
         return changes[0] if len(changes) == 1 and {changes[0].below, changes[0].above} == limit_answer.LIMIT else None
+
+    @property
+    def problem(self) -> str:
+        """Why another search has no answer, where that is the limit of runs."""
+        return CUT if self.is_cut else ""
 
     def _half(self, change: Change[Stability]) -> limit_answer.HalfStep:
         """Search a limit with half the time step."""
@@ -449,7 +461,7 @@ class _Search:
         step = HALF * float(min(steps))
         found = self._again(replace(self.plan, apart={limit_answer.STEP: step}), change, self.step_rows, step)
         if found is None:
-            return limit_answer.HalfStep(step=step, low=change.low, high=change.high, problem=NO_FINER)
+            return limit_answer.HalfStep(step=step, low=change.low, high=change.high, problem=self.problem or NO_FINER)
         return limit_answer.HalfStep(step=step, low=found.low, high=found.high)
 
     def _levels(self, side: StandingSide, least: float) -> Levels:
@@ -480,7 +492,7 @@ class _Search:
             may_stay = not (is_foretold or self.stiffer)
             found = self._again(plan, near, self.stiff_rows, scale, may_stay=may_stay)
             if found is None:
-                return replace(levels, problem=NO_STIFFER.format(ratio=scale / first))
+                return replace(levels, problem=self.problem or NO_STIFFER.format(ratio=scale / first))
             if may_stay and (found.low, found.high) == (near.low, near.high):
                 return levels
             level = limit_answer.StiffnessLevel(stiffness_scale=scale, low=found.low, high=found.high)
@@ -534,6 +546,7 @@ def repeat_limit(answer: limit_answer.LimitAnswer, execution: sweep.Replay, out:
     if answer.static_bound is not None:  # nothing was scanned
         del vary[answer.key]["count"]
     options = limit_plan.LimitOptions(vary, stands=answer.stands, tolerance=answer.tolerance, keep_runs=False)
+    options = replace(options, most_runs=answer.most_runs)
     plan = limit_plan.read_limit(document, options)
     tried: list[limit_answer.LimitAnswer] = []
     for stiffer in (None, True, False):  # what was asked for is not kept

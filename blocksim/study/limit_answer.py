@@ -17,7 +17,7 @@ from blocksim.scenario.input_files import raise_problems, read_table
 from blocksim.simulation.observables import PEAK, Response, table_columns
 from blocksim.study.answer import Answer, Overview, with_unit
 from blocksim.study.criterion import Stability
-from blocksim.study.limit_plan import NAMES, Change, LimitPlan, Number
+from blocksim.study.limit_plan import MOST_SCANNED, NAMES, Change, LimitPlan, Number
 from blocksim.study.rows import Head, Row, as_cell
 from blocksim.study.run_folder import read_run
 from blocksim.study.sweep_folder import CASES, FolderKind, case_folder
@@ -219,6 +219,8 @@ class LimitAnswer(RangeAnswer, frozen=True):
     stiffness_scale: float | None
     static_bound: float | None = None  # beyond it no equilibrium exists; the search began there
     static_side: Literal["above", "below"] | None = None  # where that is
+    most_runs: int = MOST_SCANNED  # at which the search stops; versions before had no limit
+    is_cut: bool = False  # stopped there
     runs: int
     brackets: tuple[Bracket, ...] = Field(alias="changes")
     is_as_given: bool = Field(default=False, exclude=True)  # neither stiffness nor step was corrected
@@ -260,6 +262,7 @@ class LimitAnswer(RangeAnswer, frozen=True):
                 "scheme": scenario.time.scheme,
                 "stiffness_scale": scale,
                 **(statics or {}),
+                "most_runs": plan.most_runs,
                 "runs": len(cells),
                 "changes": brackets,
                 "folder": folder,
@@ -359,8 +362,15 @@ class LimitAnswer(RangeAnswer, frozen=True):
                 yield f"warning: runs stand beyond what statics can carry, by {beyond / abs(bound):.2%}"
 
     def warnings(self) -> list[str]:
-        """Return what springs do to limits that are not those of stiff contacts."""
-        return [text for one in self.brackets for text in one.warnings(self.unit, is_as_given=self.is_as_given)]
+        """Return what springs do to limits that are not those of stiff contacts, and that the search was cut short."""
+        found = [text for one in self.brackets for text in one.warnings(self.unit, is_as_given=self.is_as_given)]
+        plan = self.plan
+        is_open = plan is not None and plan.moves_supports and plan.scenario.time.has_springs and not self.is_as_given
+        if is_open and self.falls and not any(one.levels for one in self.brackets):
+            found.append("with moving supports the effect of contact stiffness is not estimated; --stiffer computes it")
+        if self.is_cut:
+            found.append(f"warning: stopped after {self.runs} runs; --most-runs above {self.most_runs} continues")
+        return found
 
     def draw(self, path: Path, title: str, paper: style.Paper) -> None:
         """Draw both sides of the brackets whose runs were kept, what stands on the left."""

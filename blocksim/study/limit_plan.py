@@ -25,6 +25,7 @@ from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.options import Option, Overwrite, silent, takes
 from blocksim.scenario import Document, Scenario, overrides, place_bodies, scenario_hash, support, units
 from blocksim.scenario.models import study, timeline
+from blocksim.scenario.models.loads import stretches_of
 from blocksim.scenario.placement import smallest_width
 from blocksim.simulation.provenance import code_hash
 from blocksim.statics.blockwork import why_not_sustained
@@ -51,6 +52,7 @@ FLOOR = 1e-6  # of the range: brackets about zero get no narrower
 NEAR = 0.01  # of the smallest side of a block: what is farther from all that carries it is to drop
 SCANNED = 9
 MOST_SCANNED = MOST_VALUES = 1000
+MOST_RUNS = 100  # of a search; a round more may cost minutes
 TOLERANCE = 1e-3
 LEAST_TOLERANCE = 1e-9
 OPTION, OVER = "--vary", "--over"
@@ -98,13 +100,14 @@ class SearchOptions(executors.Execution):
     ]
     _: KW_ONLY
     stands: Annotated[
-        str,
+        str | None,
         Option(
             'What counts as standing, such as "moved < 5 mm", "turned < 10 deg" or "outcome != fell". '
-            "Separated by commas: all must hold.",
+            f'Separated by commas: all must hold (default: "{criterion.DEFAULT}"; where supports move '
+            f'"{criterion.OF_MOVING_SUPPORTS}").',
             metavar="CONDITIONS",
         ),
-    ] = criterion.DEFAULT
+    ] = None
     tolerance: Annotated[
         float,
         Option(
@@ -128,14 +131,23 @@ class SearchOptions(executors.Execution):
         bool | None,
         Option(
             "Search once more with springs ten times as stiff and extrapolate to stiff contacts, always or never "
-            "(default: where springs shift a limit by more than 0.25 %). --as-given also leaves the time step of rigid "
-            "contacts as it is, which is halved once otherwise.",
+            "(default: where supports rest and springs shift a limit by more than 0.25 %). --as-given also leaves the "
+            "time step of rigid contacts as it is, which is halved once otherwise.",
             ("--stiffer/--as-given",),
             python="Search once more with springs ten times as stiff and extrapolate to stiff contacts: True always, "
-            "False never (limits are then those of the springs, and of the time step, as given), None where springs "
-            "shift them by more than 0.25 %.",
+            "False never (limits are then those of the springs, and of the time step, as given), None where supports "
+            "rest and springs shift them by more than 0.25 %.",
         ),
     ] = None
+    most_runs: Annotated[
+        int,
+        Option(
+            "Stop before a round of runs that would make them more than N; brackets are then as wide as they are, and "
+            "the same command with more continues.",
+            metavar="N",
+            least=2,
+        ),
+    ] = MOST_RUNS
     out: Annotated[Path | str | None, Option("Folder to write (default: results/NAME/limit-HASH).", metavar="DIR")] = (
         None
     )
@@ -269,6 +281,19 @@ def next_near(span: SearchRange, known: Mapping[Number, Kind], near: Change[Kind
     return [] if known[low] not in (near.below, near.above) or beyond in known else [beyond]
 
 
+def has_passed(scenario: Scenario) -> bool:
+    """Return True where less acts on blocks at the end than before, so that what rocks then may come to rest yet."""
+    if moves_supports(scenario) or any(body.vx or body.vy or body.spin for body in place_bodies(scenario)):
+        return True
+    values = ([abs(one.value) for one in stretches_of(load, scenario.ground.tilt)] for load in scenario.loads)
+    return any(max(of_load) > of_load[-1] for of_load in values)
+
+
+def moves_supports(scenario: Scenario) -> bool:
+    """Return True where the ground or driven bodies move, so that what falls may stand at a value beyond."""
+    return scenario.motion is not None or any(body.motion is not None for body in scenario.bodies)
+
+
 def is_sustained(scenario: Scenario) -> bool:
     """Return True where loads are the same from time zero on, nothing moves then, and no block is to drop."""
     if why_not_sustained(scenario):
@@ -316,12 +341,28 @@ class LimitPlan:
     criterion: Criterion
     tolerance: float  # of a bracket, relative to its ends
     has_scan: bool = True  # all values of the range are scanned; if not, statics says where to begin
+    most_runs: int = MOST_RUNS
     apart: Mapping[str, object] = field(default_factory=dict)  # settings in which its runs differ from the document
 
     @cached_property
     def scenario(self) -> Scenario:
         """The scenario of the document."""
         return self.document.build()
+
+    @property
+    def moves_supports(self) -> bool:
+        """Whether the ground or driven bodies move."""
+        return moves_supports(self.scenario)
+
+    @property
+    def usual_runs(self) -> int:
+        """How many runs a scan and one change within it take."""
+        grid, count = self.span.grid(), 0
+        low, high = grid[len(grid) // 2 - 1 : len(grid) // 2 + 1]
+        while not self.span.is_narrow(low, high, self.tolerance):
+            inner = self.span.between(low, high)
+            count, high = count + len(inner), inner[0]
+        return len(grid) + count
 
     def settings(self, number: Number) -> dict[str, object]:
         """Return what distinguishes the run of a value from the document."""
@@ -382,7 +423,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
     do. Raises ScenarioError for a key or range that the scenario cannot have, InvalidInputError for a wrong criterion
     or tolerance, and where more or less than one key is given.
     """
-    stands, tolerance = criterion.read_criterion(options.stands), options.tolerance
+    stands, tolerance = criterion.read_criterion(options.stands or criterion.DEFAULT), options.tolerance
     if not LEAST_TOLERANCE <= tolerance < 1.0:
         message = f"a bracket of {tolerance:g} of the value cannot be reached; give {LEAST_TOLERANCE:g} up to below 1"
         raise InvalidInputError(message)
@@ -409,7 +450,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
     count = min(count, int(high - low) + 1) if is_whole else count  # every whole number that fits
     span = SearchRange(low, high, count, is_log=values.scale == "log", is_whole=is_whole)
     has_scan = "count" in table or options.scan is not None
-    plan = LimitPlan(bare, key, unit, span, stands, tolerance, has_scan)
+    plan = LimitPlan(bare, key, unit, span, stands, tolerance, has_scan, options.most_runs)
     at_ends = []
     for number in (low, high):
         try:
@@ -417,6 +458,9 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
         except BlocksimError as error:
             message = f"{key} = {answer.with_unit(number, unit)}: {str(error).splitlines()[0]}"
             raise InvalidInputError(message) from error
+    if options.stands is None and plan.moves_supports:
+        stands = criterion.read_criterion(criterion.OF_MOVING_SUPPORTS)
+    plan = replace(plan, criterion=replace(stands, has_passed=any(map(has_passed, at_ends))))
     start = bare.data.get("start")
     if (isinstance(start, Mapping) and "settle" in start) or not all(map(is_sustained, at_ends)):
         return plan

@@ -191,12 +191,74 @@ def test_where_springs_do_not_shift_a_limit_two_runs_say_so_and_none_where_they_
     assert found_with(formula(linear(1e-4), is_known=False), tmp_path / "cannot", stiff).runs == len(found.rows)
 
 
-def test_under_a_late_abrupt_pulse_stiffer_springs_are_asked_whatever_their_stiffness(tmp_path: Path) -> None:
-    pulse = {"kind": "pulse", "shape": "cosine", "amplitude": 1.0, "duration": 0.1}
-    for start, asked in ((0.0, 0), (0.5, 2)):
-        stiff = on_springs(contact={"restitution": 0}, motion=pulse | {"start": start}, start={"settle": False})
-        found = found_with(formula(linear(1e-4)), tmp_path / f"{start}", stiff)
-        assert found.runs == len(found.rows) + asked
+PULSE = {"kind": "pulse", "shape": "cosine", "amplitude": 1.0, "duration": 0.1}
+DRIVEN = {"block": "b", "x": 9.0, "y": 0.5, "motion": {"kind": "ramp", "distance": 0.1, "duration": 0.5}}
+
+
+def moving(kind: str) -> dict[str, Any]:
+    """Return a block whose supports, or another body, move."""
+    data = on_springs(start={"settle": False})
+    return data | {"motion": PULSE} if kind == "ground" else data | {"bodies": [*data["bodies"], DRIVEN]}
+
+
+@pytest.mark.parametrize("kind", ["ground", "body"])
+def test_where_supports_move_stiffer_springs_are_searched_when_asked_for_alone(tmp_path: Path, kind: str) -> None:
+    for stiffer, is_open in ((None, True), (True, False), (False, False)):
+        found = found_with(formula(linear(0.03)), tmp_path / f"{stiffer}", moving(kind), stiffer=stiffer)
+        assert (found.runs > len(found.rows)) is (stiffer is True)
+        assert any("--stiffer" in text for text in found.warnings() if "moving supports" in text) is is_open
+
+
+@pytest.mark.parametrize("kind", ["ground", "body"])
+@pytest.mark.parametrize("stands", ["outcome != fell", DEFAULT, "turned < 10 deg"])
+def test_what_rocks_on_after_a_motion_is_undecided_and_what_fell_has_fallen(kind: str, stands: str) -> None:
+    options = LimitOptions({"ground.tilt": {"from": "5 deg", "to": "40 deg"}}, stands=stands)
+    rocking = ROW | {"outcome": "rocking", "displacement_mm": 35.0}
+    fell = ROW | {"outcome": "fell", "turn_deg": 180.0}
+    shaken = read_limit(document_of(moving(kind)), options).criterion
+    for moves_on in (True, False):
+        assert shaken.verdict(rocking | {"moves_on": moves_on}) == "undecided"
+    assert shaken.verdict(fell | {"moves_on": True}) == "falls"
+    sustained = read_limit(document_of(on_springs()), options).criterion
+    assert (sustained.verdict(rocking) == "falls") is (stands != "outcome != fell")
+
+
+@pytest.mark.parametrize(("factors", "undecided"), [([0, 1, 1], False), ([0, 1, 0], True), ([0, -2, 1], True)])
+def test_what_rocks_under_a_load_that_lasts_falls_and_is_undecided_after_a_pulse(
+    factors: list[float], undecided: bool
+) -> None:
+    history = {"kind": "steps", "times": [0.0, 0.1, 0.2], "factors": factors}
+    load = {"kind": "force", "name": "push", "body": "1", "magnitude": "1 N", "history": history}
+    options = LimitOptions({"loads.push.magnitude": {"from": "1 N", "to": "2 N"}})
+    judged = read_limit(document_of(on_springs(loads=[load])), options).criterion
+    assert judged.verdict(ROW | {"outcome": "rocking"}) == ("undecided" if undecided else "falls")
+
+
+def test_standing_means_not_fallen_where_supports_move_unless_it_is_said() -> None:
+    vary = {"ground.tilt": {"from": "5 deg", "to": "40 deg"}}
+    fallen = "outcome != fell"
+    for data, text in ((on_springs(), DEFAULT), (moving("ground"), fallen), (moving("body"), fallen)):
+        assert read_limit(document_of(data), LimitOptions(vary)).criterion.text == text
+        assert read_limit(document_of(data), LimitOptions(vary, stands=DEFAULT)).criterion.text == DEFAULT
+
+
+def test_a_search_that_is_cut_short_says_so_and_continues_with_more_runs(tmp_path: Path) -> None:
+    execution = formula(linear(0.06))
+    whole = found_with(execution, tmp_path / "whole")
+    assert whole.plan is not None
+    assert not whole.is_cut
+    assert whole.plan.usual_runs == 9 + 2 * 5
+    found = whole
+    for most in (9, 12, len(whole.rows), whole.runs - 1, whole.runs):
+        found = found_with(execution, tmp_path / "cut", most_runs=most)
+        assert found.runs <= most
+        assert found.is_cut is (most < whole.runs)
+        assert any("--most-runs" in text for text in found.warnings()) is found.is_cut
+        assert json.loads((tmp_path / "cut/limit.json").read_text())["is_cut"] is found.is_cut
+        assert not any("no such limit" in one.problem for one in found.brackets)
+        assert min(abs(one.low - linear(0.06)(1.0)) for one in found.limits_as_given) < 5.0
+    assert (found.limits, found.run) == (whole.limits, 2)  # a round
+    assert len(execution.asked) == 2 * whole.runs
 
 
 def test_without_a_start_at_rest_the_bracket_holds_what_goes_with_the_root_of_the_stiffness_too(tmp_path: Path) -> None:
