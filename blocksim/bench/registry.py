@@ -38,7 +38,7 @@ def measure_start(effort: harness.Effort) -> harness.Readings:
 def _seconds(code: str, *arguments: str, **environment: str) -> float:
     """Run Python code in a process of its own and return the seconds it took; raises StartError where it fails."""
     began = time.perf_counter()
-    command = [sys.executable, "-c", code, *arguments]
+    command = [sys.executable, "-P", "-c", code, *arguments]
     done = subprocess.run(  # noqa: S603 - our own command
         command, env=os.environ | environment, capture_output=True, text=True, check=False
     )

@@ -85,9 +85,28 @@ def pause_collector() -> Iterator[None]:
             gc.enable()
 
 
+def _distrust_current_folder() -> None:
+    """Take no module from the current folder, here and in processes to be started: it may be a stranger's.
+
+    An empty path means that folder: `python -c` has one, and so has a PYTHONPATH that ends with a colon. Modules that
+    Python itself has imported by now come from there all the same.
+    """
+    named, unwanted = os.environ.get("PYTHONPATH", ""), {""}
+    with suppress(OSError):  # the folder was removed
+        here = os.path.realpath(os.curdir)
+        if os.path.realpath(__file__).startswith(f"{here}{os.sep}blocksim{os.sep}"):  # this package is taken from there
+            return
+        paths = [one for one in named.split(os.pathsep) if one]
+        if named and "" in named.split(os.pathsep) and here not in map(os.path.realpath, paths):
+            unwanted.add(here)
+            os.environ["PYTHONPATH"] = os.pathsep.join(paths)
+    sys.path[:] = [one for one in sys.path if one not in unwanted]
+
+
 def main() -> None:
     """Run the command line; every error becomes a message and an exit code."""
     began = time.monotonic()
+    _distrust_current_folder()
     gc.set_threshold(50_000)  # what imports and pictures make by the thousand lives to the end
     with suppress(ValueError):  # not the main thread, which alone receives signals
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # neither taken nor ignored

@@ -3,6 +3,7 @@
 The only executor that can keep whole runs, in folders of their own.
 """
 
+import os
 import signal
 import threading
 from collections import deque
@@ -11,7 +12,6 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing import active_children, get_context, parent_process, resource_tracker
-from os import _exit
 from typing import Any, NamedTuple
 
 from blocksim.simulation import interruption, provenance
@@ -20,6 +20,7 @@ from blocksim.study.rows import Row
 
 AHEAD = 2  # batches a process: it need not wait for the next one
 POLL = 0.05  # s
+SAFE_PATH = "PYTHONSAFEPATH"
 DEAD: Row = {
     "status": "failed",
     "reason": "its worker process has died twice (out of memory?); --retry-failed runs it again",
@@ -31,7 +32,7 @@ DEAD: Row = {
 def pool_of(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Give a pool that ends at once when something goes wrong here: what is cut off is run again next time."""
     others = set(active_children())
-    with _signals_held():  # Python counts semaphores in a process that has to outlive what a terminal sends to all
+    with _safe_start():  # Python counts semaphores in a process that has to outlive what a terminal sends to all
         resource_tracker.ensure_running()
     # spawned, not forked: threads of numerical libraries do not survive a fork
     pool = _Pool(workers, mp_context=get_context("spawn"), initializer=_start_worker)
@@ -50,21 +51,27 @@ class _Pool(ProcessPoolExecutor):
 
     def submit(self, *task: Any, **named: Any) -> Future[Any]:
         """Submit a task; this is where processes are started."""
-        with _signals_held():
+        with _safe_start():
             return super().submit(*task, **named)
 
 
 @contextmanager
-def _signals_held() -> Iterator[None]:
-    """Hold back what a terminal sends to all processes; it is held for ever in those that are started meanwhile."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, interruption.FOR_ALL)
+def _safe_start() -> Iterator[None]:
+    """Keep from processes that are started meanwhile what a terminal sends to all, and modules of the current folder.
+
+    Python starts them with `-c`, which looks for modules in that folder first, before it has the paths of this process.
+    """
+    before, safe = os.environ.get(SAFE_PATH), hasattr(signal, "pthread_sigmask")
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, interruption.FOR_ALL) if safe else None
+    os.environ[SAFE_PATH] = "1"
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        del os.environ[SAFE_PATH]
+        if before is not None:
+            os.environ[SAFE_PATH] = before
+        if held is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)
 
 
 def _start_worker() -> None:
@@ -75,7 +82,7 @@ def _start_worker() -> None:
     def end_with_parent() -> None:
         if (parent := parent_process()) is not None:
             parent.join()
-        _exit(0)
+        os._exit(0)
 
     threading.Thread(target=end_with_parent, daemon=True).start()
 
