@@ -49,7 +49,7 @@ def test_what_is_in_memory_draws_without_files(blocks: Result, tmp_path: Path, m
     assert images(blocks._repr_html_()) == ["png"]
     film = blocks.animate(width=200, fps=5.0)
     assert (images(film._repr_html_()), film.figure) == (["gif"], None)
-    assert "srcdoc=" in blocks.report()._repr_html_()
+    assert blocks.report()._repr_html_().startswith('<iframe sandbox="allow-scripts" srcdoc=')
     assert [path.name for path in tmp_path.iterdir()] == ["three_blocks.png"]
 
 

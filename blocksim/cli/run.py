@@ -77,7 +77,7 @@ def _page(folder: Path) -> Iterator[None]:
     from blocksim.study import live
 
     with live.beside_run(folder) as address:
-        output.note(f"live: {address}")
+        output.note(f"live: {address or 'warning: the page does not answer'}")
         yield
 
 

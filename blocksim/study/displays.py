@@ -117,7 +117,8 @@ class PageDisplay:
 
     def _repr_html_(self) -> str:
         look = f"width:100%;height:{FRAME_HEIGHT}px;border:0"
-        return f'<iframe srcdoc="{escape(self.text)}" style="{look}"></iframe>'
+        sandbox = "allow-scripts"  # it reaches nothing of the notebook
+        return f'<iframe sandbox="{sandbox}" srcdoc="{escape(self.text)}" style="{look}"></iframe>'
 
 
 SIZES = np.zeros((2, 2))  # of two frames: contacts and overlaps

@@ -1,10 +1,14 @@
 """A run shown while it computes: a page on the loopback address of this machine, which reads the folder of the run.
 
 Beside a run the server is a process of its own, so that it takes no part in the computation; it ends when the pipe from
-the run is closed, however the run ends. It answers requests for this address only, and sends nothing anywhere.
+the run is closed, however the run ends. It answers requests for this address only, and sends nothing anywhere. Other
+users of this machine reach the server too, and so its address has a random part, which it gives to the run alone.
 """
 
 import json
+import re
+import secrets
+import select
 import subprocess
 import sys
 import threading
@@ -12,6 +16,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from socketserver import ThreadingMixIn
 from typing import Any
@@ -26,11 +31,8 @@ from blocksim.view.report import page, subjects
 HOST = "127.0.0.1"
 LAST_SECONDS = 3.0  # after the end of a run, in which an open page fetches the last frame
 WAIT_SECONDS = 0.2  # for a request, before the end is looked for
-HEADERS = [
-    ("Cache-Control", "no-store"),
-    ("X-Content-Type-Options", "nosniff"),
-    ("Content-Security-Policy", "default-src 'self' data: 'unsafe-inline'; frame-ancestors 'self'"),
-]
+PATIENCE = 30.0  # s for a server to start, and to end after LAST_SECONDS; it may be stopped, and is killed then
+HEADERS = (("Cache-Control", "no-store"), ("X-Content-Type-Options", "nosniff"), ("Referrer-Policy", "no-referrer"))
 Start = Callable[[str, list[tuple[str, str]]], object]
 
 
@@ -39,29 +41,35 @@ class LivePage:
 
     def __init__(self, folder: Path) -> None:
         """Begin before anybody has asked."""
-        self.folder = folder
+        self.folder, self.place = folder, f"/{secrets.token_urlsafe()}"
         self.lock = threading.Lock()
         self.is_open = False  # whether a page has asked
         self.last_shown = ""  # version of the report that was sent last
 
     def __call__(self, request: dict[str, Any], start: Start) -> Iterable[bytes]:
-        """Answer a request: `/` the page, `/state` what the run has come to, `/report` its report."""
+        """Answer a request: the page, `state`, what the run has come to, or `report`, all in the place of this run."""
         host = str(request.get("HTTP_HOST", "")).rpartition(":")[0]
-        path, is_own = request.get("PATH_INFO", "/"), host in {HOST, "localhost"}
-        if request.get("REQUEST_METHOD") != "GET" or not is_own or path not in {"/", "/state", "/report"}:
-            start("403 Forbidden" if not is_own else "404 Not Found", HEADERS)
-            return [b""]
+        place, _, asked = str(request.get("PATH_INFO", "/")).rpartition("/")
+        if request.get("REQUEST_METHOD") != "GET" or host not in {HOST, "localhost"}:
+            return self._refused("403 Forbidden", start)
+        is_known = secrets.compare_digest(place.encode(errors="replace"), self.place.encode())
+        if not is_known or asked not in {"", "state", "report"}:
+            return self._refused("404 Not Found", start)
         self.is_open = True
-        kind, version = "text/html; charset=utf-8", ""
+        kind, version, policy = "text/html; charset=utf-8", "", "default-src 'none'"
         with self.lock:
-            if path == "/state":
+            if asked == "state":
                 kind, text = "application/json", json.dumps(self.state())
-            elif path == "/report":
-                version, text = self.version(), self.report()
+            elif asked == "report":  # it has a policy of its own, which cannot say this
+                version, text, policy = self.version(), self.report(), "frame-ancestors 'self'"
             else:
-                text = (page.PARTS / "live.html").read_text(encoding="utf-8")
-        start("200 OK", [("Content-Type", kind), *HEADERS])
+                text, policy = live_page()
+        start("200 OK", [("Content-Type", kind), ("Content-Security-Policy", policy), *HEADERS])
         return self._sent(text.encode(errors="replace"), version)
+
+    def _refused(self, status: str, start: Start) -> Iterable[bytes]:
+        start(status, [*HEADERS])  # a new list, as the server adds to it
+        return [b""]
 
     def _sent(self, content: bytes, version: str) -> Iterator[bytes]:
         yield content
@@ -106,11 +114,24 @@ class LivePage:
         return page.page_text(parts, title=report.title_of(parts), version=__version__)
 
 
+@cache
+def live_page() -> tuple[str, str]:
+    """Return the text of the page, and its policy: its own style and script, its state and its report."""
+    text = (page.PARTS / "live.html").read_text(encoding="utf-8")
+    style, script = (re.findall(f"<{kind}>(.*?)</{kind}>", text, re.DOTALL)[0] for kind in ("style", "script"))
+    return text, page.policy_of(style, script, "connect-src 'self'", "frame-src 'self'", "frame-ancestors 'none'")
+
+
 class _Server(ThreadingMixIn, WSGIServer):
     """A thread for every connection: browsers open some that they do not use yet."""
 
     daemon_threads = True
     block_on_close = False
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Report what is wrong here, and not that a browser has gone."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
 
 class _Silent(WSGIRequestHandler):
@@ -124,16 +145,7 @@ def open_server(folder: Path) -> Iterator[tuple[WSGIServer, LivePage, str]]:
     answers = LivePage(folder)
     with make_server(HOST, 0, answers, _Server, _Silent) as server:
         server.timeout = WAIT_SECONDS
-        yield server, answers, f"http://{HOST}:{server.server_port}/"
-
-
-def serve(folder: Path, on_address: Callable[[str], object]) -> None:
-    """Show the run in a folder until Ctrl-C."""
-    with open_server(folder) as (server, _, address):
-        on_address(address)
-        with suppress(KeyboardInterrupt):
-            while True:
-                server.handle_request()
+        yield server, answers, f"http://{HOST}:{server.server_port}{answers.place}/"
 
 
 @contextmanager
@@ -144,9 +156,14 @@ def beside_run(folder: Path) -> Iterator[str]:
         assert server.stdin is not None  # noqa: S101 - it is a pipe
         assert server.stdout is not None  # noqa: S101 - as above
         try:
-            yield server.stdout.readline().strip()
+            started, _, _ = select.select([server.stdout], [], [], PATIENCE)
+            yield server.stdout.readline().strip() if started else ""
         finally:
             server.stdin.close()
+            try:
+                server.wait(LAST_SECONDS + PATIENCE)
+            except subprocess.TimeoutExpired:
+                server.kill()
 
 
 def _main(folder: Path) -> None:

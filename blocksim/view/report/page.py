@@ -38,14 +38,18 @@ def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
     style, *scripts = ((PARTS / name).read_text(encoding="utf-8") for name in names)
     # all scripts as one, whose names are seen by nothing else in the page
     script = '\n(() => {\n"use strict";\n' + "\n".join(scripts) + "\n})();\n"
-    # what the page may load and run: its own style and script and pictures within it, nothing else
-    nothing = (f"{name} 'none'" for name in ("default-src", "base-uri", "form-action"))
-    hashes = {kind: sha256(text.encode()).digest() for kind, text in (("style", style), ("script", script))}
-    own = (f"{kind}-src 'sha256-{b64encode(found).decode()}'" for kind, found in hashes.items())  # CSP level 2
-    policy = "; ".join((*nothing, *own, "img-src data:"))
+    policy = policy_of(style, script)
     told = {"title": title, "version": version, "subjects": subjects, "listed": listed, "labels": labels(listed)}
     page = _environment().get_template("page.html")
     return str(page.render(**told, policy=policy, style=style, script=script))
+
+
+def policy_of(style: str, script: str, *more: str) -> str:
+    """Return what a page may load and run: its own style and script and pictures within it, and nothing but `more`."""
+    nothing = (f"{name} 'none'" for name in ("default-src", "base-uri", "form-action"))
+    hashes = {kind: sha256(text.encode()).digest() for kind, text in (("style", style), ("script", script))}
+    own = (f"{kind}-src 'sha256-{b64encode(found).decode()}'" for kind, found in hashes.items())  # CSP level 2
+    return "; ".join((*nothing, *own, "img-src data:", *more))
 
 
 @functools.cache
