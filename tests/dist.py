@@ -39,6 +39,19 @@ def last_commit() -> str:
     return found.stdout.strip() or str(int((ROOT / "blocksim/LICENSE").stat().st_mtime))
 
 
+def tracked_files(copy: Path) -> Path:
+    """Return a copy of what git tracks, so that nothing else that lies here is packed; of an unpacked sdist all."""
+    command = [shutil.which("git") or "git", "ls-files", "-z"]
+    found = subprocess.run(command, cwd=ROOT, capture_output=True, check=False) if (ROOT / ".git").exists() else None
+    if found is None or found.returncode:
+        return ROOT
+    for name in filter(None, os.fsdecode(found.stdout).split("\0")):
+        if (ROOT / name).is_file():  # it may be deleted and not committed yet
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, copy / name)
+    return copy
+
+
 def build(source: Path, target: Path, kind: str, epoch: str) -> Path:
     """Build `sdist` or `wheel` of a source folder; return the file."""
     before = set(target.glob("*"))
@@ -59,14 +72,15 @@ def build_all(out: Path) -> list[Path]:
     for old in (*out.glob("blocksim-*.whl"), *out.glob("blocksim-*.tar.gz")):
         old.unlink()
     epoch = last_commit()
-    made = [build(ROOT, out, kind, epoch) for kind in ("sdist", "wheel")]
     with TemporaryDirectory() as folder:
+        checkout = tracked_files(Path(folder) / "checkout")
+        made = [build(checkout, out, kind, epoch) for kind in ("sdist", "wheel")]
         again = Path(folder) / "again"
         again.mkdir()
         with tarfile.open(made[0]) as packed:
             packed.extractall(folder)  # noqa: S202 - built here, a line above; 3.11.2 knows no filter
         (source,) = Path(folder).glob("blocksim-*")
-        others = [build(ROOT, again, "sdist", epoch), build(source, again, "wheel", epoch)]
+        others = [build(checkout, again, "sdist", epoch), build(source, again, "wheel", epoch)]
         for one, other in zip(made, others, strict=True):
             if digest(one) != digest(other):
                 raise ValueError(f"{one.name}: two builds differ")

@@ -33,6 +33,19 @@ def test_wheel_and_sdist_are_the_same_bytes_twice_and_bring_templates_and_scenar
     assert [name for name in names if "__pycache__" in name or "/results/" in name] == []
 
 
+def test_only_what_git_tracks_is_packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    root = tmp_path / "root"
+    (root / "room").mkdir(parents=True)
+    for name in ("kept.py", "room/kept ü.py", "gone.py", "notes.txt", "room/private.key"):
+        (root / name).write_text(name)
+    for words in (("init", "-q"), ("add", "kept.py", "room/kept ü.py", "gone.py")):
+        dist.call("git", *words, folder=root)
+    (root / "gone.py").unlink()
+    monkeypatch.setattr(dist, "ROOT", root)
+    copy = dist.tracked_files(tmp_path / "copy")
+    assert {str(path.relative_to(copy)) for path in copy.rglob("*.*")} == {"kept.py", "room/kept ü.py"}
+
+
 @pytest.mark.long
 def test_a_wheel_is_all_that_somebody_needs(tmp_path: Path) -> None:
     made = dist.build_all(tmp_path / "dist")

@@ -28,7 +28,10 @@ AGAIN = 0.01  # s, after which Ctrl-C that was lost comes again: whoever lost it
 
 
 class Interrupts:
-    """Handler of Ctrl-C of the whole process; a part that can stop in a better way may replace it for a while."""
+    """Handler of Ctrl-C, SIGTERM and SIGHUP of the whole process.
+
+    A part that can stop in a better way may replace it for a while.
+    """
 
     gives_way = True
     has_to_clear_up = has_come = False  # while it begins to be loaded
@@ -109,8 +112,11 @@ def main() -> None:
     _distrust_current_folder()
     gc.set_threshold(50_000)  # what imports and pictures make by the thousand lives to the end
     with suppress(ValueError):  # not the main thread, which alone receives signals
+        interrupts = Interrupts()
+        for name in {"SIGTERM", "SIGHUP"} & set(signal.Signals.__members__):
+            if signal.getsignal(signal.Signals[name]) is signal.SIG_DFL:
+                signal.signal(signal.Signals[name], interrupts)
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # neither taken nor ignored
-            interrupts = Interrupts()
             signal.signal(signal.SIGINT, interrupts)
             sys.unraisablehook = interrupts.come_again
             # Python's end would bring the system's handler back, and with it another exit code; what is ignored stays
@@ -123,6 +129,14 @@ def main() -> None:
 
     try:
         app(obj=began)
+    except SystemExit as ended:
+        frames = sys.modules.get("blocksim.simulation.stores.hdf5")
+        if frames is not None and frames.failures and isinstance(ended.code, int):
+            for stream in (sys.stdout, sys.stderr):
+                with suppress(OSError):
+                    stream.flush()
+            os._exit(ended.code)
+        raise
     except KeyboardInterrupt:
         sys.exit(ExitCode.STOPPED_EARLY)
     except Exception as error:  # noqa: BLE001 - the last line of defence

@@ -37,7 +37,8 @@ def capacity_command(
     One line for each actuator and direction (push is along it): peak of its force, displacement of its point there and
     where the force has fallen to 0.8 of the peak, secant stiffness between 0.15 and 0.4 of the peak (with springs),
     work done on the structure by the end, and the force beyond which statics finds no equilibrium of the structure as
-    it is at the start. A run that was not quasi-static gives a warning.
+    it is at the start. A run that was not quasi-static gives a warning. The same command again continues a run that was
+    stopped or killed.
 
     Picture: blocksim plot RUN --kind capacity. Curves: probe-NAME.csv in the run's folder.
 
@@ -53,10 +54,13 @@ def capacity_command(
         with source.built() as ready, progress.run_progress(quiet=screen.silent) as on_progress:
             prepare.warn_of_values([ready], screen)
             note = RunCallbacks(screen.note, lambda kernels: start(kernels, quiet=screen.silent))
-            result = run.run(ready, out=files.default_folder(ready), on_progress=on_progress, listener=note)
+            out = files.default_folder(ready)
+            result = run.run(ready, out=out, resume=True, on_progress=on_progress, listener=note)
         if result.status != rows.FINISHED:
             why = f"{result.name}: {result.status}: {result.reason}; partial results are in {result.folder}"
-            return command_line.Report([], {"run": str(result.folder)}, [why], code=ExitCode(result.summary.exit_code))
+            code = ExitCode(result.summary.exit_code)
+            why += "; rerun the command to finish" if code == ExitCode.STOPPED_EARLY else ""
+            return command_line.Report([], {"run": str(result.folder)}, always=[why], code=code)
         answer = capacity(result)
     return _report(answer)
 

@@ -1,6 +1,7 @@
 """blocksim new and schema: what a scenario is written with, templates and the schema for editors."""
 
 import shutil
+import stat
 import tomllib
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -114,7 +115,10 @@ def _copy_scenarios(path: Path) -> command_line.Report:
     if path.exists():
         raise OutputExistsError(f"{path}: already exists; choose another name")
     try:
-        shutil.copytree(shipped(), path, ignore=shutil.ignore_patterns("results", "__pycache__"))
+        ignored = shutil.ignore_patterns("results", "__pycache__")
+        shutil.copytree(shipped(), path, ignore=ignored, copy_function=shutil.copyfile)
+        for folder in (path, *filter(Path.is_dir, path.rglob("*"))):  # those of a package may be read-only
+            folder.chmod(folder.stat().st_mode | stat.S_IRWXU)
     except OSError as error:  # of copytree a list of files
         raise OutputError(f"{path}: cannot be written: {error.strerror or 'not all files could be copied'}") from error
     return command_line.Report([str(path)], notes=[f"next: blocksim run {path / 'three_blocks.toml'}"])

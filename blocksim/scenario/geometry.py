@@ -110,16 +110,24 @@ def height_above(corners: Floats, points: Floats) -> Floats:
 
 
 def self_crossings(corners: Floats) -> Iterator[tuple[int, int]]:
-    """Yield pairs of edges of a polygon that cross or touch although they are no neighbours."""
-    edges = [*_edges(corners)]
-    for i, (a0, a1) in enumerate(edges):
-        for j, (b0, b1) in enumerate(edges[i + 2 :], start=i + 2):
-            low = np.maximum(np.minimum(a0, a1), np.minimum(b0, b1))
-            high = np.minimum(np.maximum(a0, a1), np.maximum(b0, b1))
-            a, b = a1 - a0, b1 - b0
-            crosses = _cross(a, b0 - a0) * _cross(a, b1 - a0) <= 0.0 and _cross(b, a0 - b0) * _cross(b, a1 - b0) <= 0.0
-            if (j + 1) % len(edges) != i and crosses and bool((low <= high).all()):
-                yield i, j
+    """Yield pairs of edges of a polygon that cross or touch although they are no neighbours, in their order."""
+    begins, ends = corners, np.roll(corners, -1, axis=0)
+    low, high, count = np.minimum(begins, ends), np.maximum(begins, ends), len(corners)
+    order = np.argsort(low[:, 0], kind="stable")
+    reaches = np.searchsorted(low[order, 0], high[:, 0], side="right")  # those that begin before an edge ends, along x
+
+    def sides(origin: Floats, way: Floats, *points: Floats) -> Floats:
+        one, other = (way[..., 0] * (at - origin)[..., 1] - way[..., 1] * (at - origin)[..., 0] for at in points)
+        return one * other
+
+    found: list[tuple[int, int]] = []
+    for rank, i in enumerate(order.tolist()):
+        j = order[rank + 1 : reaches[i]]
+        meets = (low[j, 1] <= high[i, 1]) & (low[i, 1] <= high[j, 1]) & ~np.isin((j - i) % count, (1, count - 1))
+        meets &= sides(begins[i], ends[i] - begins[i], begins[j], ends[j]) <= 0.0
+        meets &= sides(begins[j], ends[j] - begins[j], begins[i], ends[i]) <= 0.0
+        found += [(min(i, one), max(i, one)) for one in j[meets].tolist()]
+    yield from sorted(found)
 
 
 def count_across(corners: Floats, spacing: float) -> tuple[int, int]:

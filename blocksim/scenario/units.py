@@ -303,6 +303,10 @@ class Quantity(FieldReader):
         return {"anyOf": [number, {**_TEXT_SCHEMA, "examples": [self.kind.example]}]}
 
 
+NO_SLIP = 1e6
+"""Greatest coefficient of friction: beside numbers a thousand times greater the solver of statics loses others."""
+
+
 @dataclass(frozen=True)
 class FrictionCoefficient(FieldReader):
     """Annotation of a float field: a coefficient, or a friction angle ("21 deg") whose tangent it is."""
@@ -315,14 +319,18 @@ class FrictionCoefficient(FieldReader):
             bare = _TEXT.fullmatch(value.replace(",", "."))
             if bare and (not bare[2] or bare[2] in PERCENT):
                 return Quantity(NUMBER).read(value)
-            return math.tan(Quantity(ANGLE, at_least=0.0, below=math.pi / 2).read(value))
-        if isinstance(value, bool) or not isinstance(value, int | float):
+            coefficient = math.tan(Quantity(ANGLE, at_least=0.0, below=math.pi / 2).read(value))
+        elif isinstance(value, bool) or not isinstance(value, int | float):
             raise invalid(f"{toml(value)} is not a number; {self.wanted} is needed")
-        return Quantity(NUMBER, at_least=0.0).read(value)
+        else:
+            coefficient = Quantity(NUMBER, at_least=0.0).read(value)
+        if coefficient > NO_SLIP:
+            raise invalid(f"{toml(value)} is too much to compute with; {NO_SLIP:g} is no slip")
+        return coefficient
 
     def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
         """Return the JSON Schema of a number or an angle with its unit."""
-        return {"anyOf": [{**usual, "minimum": 0}, {**_TEXT_SCHEMA, "examples": ["21 deg"]}]}
+        return {"anyOf": [{**usual, "minimum": 0, "maximum": NO_SLIP}, {**_TEXT_SCHEMA, "examples": ["21 deg"]}]}
 
 
 @functools.lru_cache(maxsize=1024)

@@ -148,6 +148,15 @@ def open_server(folder: Path) -> Iterator[tuple[WSGIServer, LivePage, str]]:
         yield server, answers, f"http://{HOST}:{server.server_port}{answers.place}/"
 
 
+def serve(folder: Path, on_address: Callable[[str], object]) -> None:
+    """Show the run in a folder until Ctrl-C."""
+    with open_server(folder) as (server, _, address):
+        on_address(address)
+        with suppress(KeyboardInterrupt):
+            while True:
+                server.handle_request()
+
+
 @contextmanager
 def beside_run(folder: Path) -> Iterator[str]:
     """Show the run that goes into a folder until it ends; give the address of the page, empty without one."""

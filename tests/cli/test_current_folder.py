@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import textwrap
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -39,32 +38,6 @@ SHORT = ("slide.toml", *SOFT, "--set", "time.end=0.01", "-q")
 FRICTION = "friction.block_ground=0.3,0.4"
 PROCESSES = ("--executor", "processes", "--jobs", "1")
 FEW = ("--trials", "1", "--samples", "1", "--fresh", "1")
-PUSHED = """
-    schema = 1
-    name = "pushed"
-    [materials.stone]
-    density = 2000
-    young_modulus = "1 GPa"
-    poisson_ratio = 0.2
-    [blocks.stone]
-    width = "0.2 m"
-    height = "0.1 m"
-    length = "0.1 m"
-    material = "stone"
-    [[bodies]]
-    name = "stone"
-    block = "stone"
-    x = 0
-    y = "0.05 m"
-    [[actuators]]
-    body = "stone"
-    stiffness = "1 MN/m"
-    displacement = { kind = "ramp", to = "1 mm", rate = "0.2 m/s" }
-    [contact]
-    stiffness_scale = 0.01
-    [time]
-    end = 0.01
-"""
 COMMANDS_IN_TURN: tuple[tuple[str, ...], ...] = (
     ("new", "wall", "made"),
     ("schema",),
@@ -109,7 +82,7 @@ def folder(tmp_path: Path) -> Path:
         (folder / f"{name}.py").write_text(HOSTILE.format(path=str(marks)))
     (folder / ".numba_config.yaml").write_text("threading_layer: strangers\n")
     (folder / "slide.toml").write_text((SCENARIOS / "slide.toml").read_text())
-    (folder / "pushed.toml").write_text(textwrap.dedent(PUSHED))
+    (folder / "pushed.toml").write_text((Path(__file__).parent / "scenes" / "pushed.toml").read_text())
     (folder / "measured.csv").write_text("block,quantity,unit,replicate,value\nblock,x,mm,1,4\nblock,x,mm,2,5\n")
     return folder
 

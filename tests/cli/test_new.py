@@ -1,10 +1,12 @@
 """blocksim new: every template works as it is, and nothing is replaced."""
 
 import errno
+import stat
 from pathlib import Path
 
 import pytest
 
+from blocksim.cli import new
 from blocksim.cli.new import templates
 from blocksim.scenario import load_scenario
 from tests.cli.conftest import Command
@@ -76,3 +78,20 @@ def test_a_full_disk_leaves_no_half_file(blocksim: Command, monkeypatch: pytest.
     answer = blocksim("new", "stack", "mine")
     assert (answer.code, answer.err) == (74, "mine.toml: cannot be written: No space left on device\n")
     assert not Path("mine.toml").exists()
+
+
+def test_scenarios_copied_from_a_read_only_package_can_be_edited(
+    blocksim: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "package"
+    (package / "soil").mkdir(parents=True)
+    for name in ("a.toml", "soil/b.toml"):
+        (package / name).write_text("schema = 1\n")
+        (package / name).chmod(0o444)
+    (package / "soil").chmod(0o555)
+    monkeypatch.setattr(new, "shipped", lambda: package)
+    assert blocksim("new", "scenarios", "mine").code == 0
+    copied = [Path("mine"), *Path("mine").rglob("*")]
+    assert len(copied) == 4
+    assert all(path.stat().st_mode & stat.S_IWUSR for path in copied)
+    (package / "soil").chmod(0o755)

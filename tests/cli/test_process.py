@@ -19,7 +19,7 @@ from blocksim.cli.app import STOPPED_EARLY
 from blocksim.errors import ExitCode
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5 import read_frames
-from tests.cli.conftest import PATIENCE, SOFT, Process, end_of, wait_for, wait_for_frames
+from tests.cli.conftest import PATIENCE, SOFT, Process, committed, end_of, wait_for, wait_for_frames, wait_until
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
 ENDLESS = ("run", NOMINAL, *SOFT, "--set", "time.end=500", "--set", "time.stop_at_rest=false", "--out", "out")
@@ -45,6 +45,21 @@ s.json_schema = lambda: (call(), time.sleep(20))
 LATE = "import atexit, os, signal; atexit.register(os.kill, os.getpid(), signal.SIGINT)"
 BROKEN = "import blocksim.scenario; blocksim.scenario.json_schema = lambda: 1 / 0"
 LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"
+FULL = """
+import os
+from blocksim.simulation.stores.hdf5 import FrameFile
+reserve, calls = FrameFile._reserve, []
+
+def fail(self, size):  # as file systems do whose promise of room is worth nothing
+    calls.append(size)
+    if len(calls) < {}:
+        return reserve(self, size)
+    handle = self.file.id.get_vfd_handle()
+    os.dup2(os.open("/proc/self/fd/%d" % handle, os.O_RDONLY), handle)
+
+FrameFile._reserve = fail
+"""
+UNWRITTEN = "out/run.h5: cannot be written: Bad file descriptor\n"
 TOO_LARGE = "out/{}: cannot be written: File too large\n"
 INTERNAL = "internal error: ZeroDivisionError: division by zero; please report it with the file FILE\n"
 ENDS = {
@@ -116,6 +131,54 @@ def test_ctrl_c_again_stops_a_run_that_is_writing(process: Process, tmp_path: Pa
     assert ended.code == 75
     is_short = presses > 1 and ended.err.count("\n") <= 3 and "Traceback" not in ended.err
     assert ended.err == "stopped\n" or is_short
+
+
+@pytest.mark.parametrize("write", [1, 2, 3])
+def test_a_write_that_fails_under_hdf5_is_74_and_no_crash(process: Process, write: int) -> None:
+    ended = end_of(process(*DENSE, before=FULL.format(write)))
+    assert (ended.code, ended.out) == (74, ""), ended.err
+    assert UNWRITTEN in ended.err
+
+
+SLOW = "import time, {0} as late; late.{1} = lambda *a, **b: (open('slow', 'w').close(), time.sleep(600))"
+STATIC = ("limit", "scenarios/tilting_wall.toml", "--vary", "friction.block_block=0.1:0.9", "--static")
+PUSHED = "scenarios/walls/pushed_granite_wall.toml"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    ("command", "module", "function"),
+    [
+        (STATIC, "blocksim.study.static_limit", "find_static"),
+        (("capacity", PUSHED), "blocksim.study.run", "simulate_into"),
+        (("check", PUSHED), "blocksim.world.describe", "describe"),
+    ],
+    ids=lambda one: one[0] if isinstance(one, tuple) else "",
+)
+def test_signals_that_mean_ctrl_c_end_what_is_no_run_with_75(
+    process: Process, tmp_path: Path, command: tuple[str, ...], module: str, function: str, number: signal.Signals
+) -> None:
+    running = process(*command, before=SLOW.format(module, function))
+    wait_for(tmp_path / "slow", running)
+    running.send_signal(number)
+    ended = end_of(running)
+    assert (ended.code, ended.out) == (75, "")
+    assert ended.err.splitlines()[-1] == "stopped"
+    assert "Traceback" not in ended.err
+
+
+def test_capacity_continues_a_run_that_was_stopped(process: Process, tmp_path: Path) -> None:
+    capacity = ("capacity", Path(__file__).parent / "scenes" / "pushed.toml", "--set", "time.end=2", "-q")
+    running = process(*capacity)
+    wait_until(lambda: any(committed(one) >= 3 for one in tmp_path.glob("results/*/*/run.h5")), running)
+    running.send_signal(signal.SIGTERM)
+    ended = end_of(running)
+    assert ended.code == 75
+    assert "stopped by SIGTERM" in ended.err
+    again = end_of(process(*capacity))
+    (summary,) = tmp_path.glob("results/*/*/run.json")
+    assert again.code == 0, again.err
+    assert json.loads(summary.read_text())["resumed_from"] != []
 
 
 def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Outlines of blocks and soils: area, moments, faults, what they meet and what fills them, found another way."""
 
+import itertools
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import given, strategies as st
 from blocksim.scenario import geometry
 from blocksim.scenario.geometry import (
     Corner,
+    Floats,
     area_of,
     box_of,
     centre_outline,
@@ -124,3 +126,31 @@ def test_a_lattice_keeps_its_discs_inside_and_the_weight_above_counts_what_is_th
     assert len(sloping) * 0.05**2 == pytest.approx(1.0, abs=0.05)
     points = np.array([[0.5, 0.5], [1.5, 0.25], [0.5, 2.5]])
     assert geometry.height_above(ELL, points) == pytest.approx([1.5, 0.75, 0.0])
+
+
+def side(a: Floats, b: Floats, point: Floats) -> float:
+    """Return on which side of the line from a to b a point lies."""
+    return float((b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0]))
+
+
+def meeting(corners: Floats) -> list[tuple[int, int]]:
+    """Return the pairs of edges that meet, one pair after the other."""
+    ends, count, found = np.roll(corners, -1, axis=0), len(corners), []
+    for i, j in itertools.combinations(range(count), 2):
+        a, b, c, d = corners[i], ends[i], corners[j], ends[j]
+        crosses = side(a, b, c) * side(a, b, d) <= 0.0 >= side(c, d, a) * side(c, d, b)
+        boxes = np.maximum(np.minimum(a, b), np.minimum(c, d)) <= np.minimum(np.maximum(a, b), np.maximum(c, d))
+        if (j - i) % count not in (1, count - 1) and crosses and boxes.all():
+            found.append((i, j))
+    return found
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 8, 20])
+def test_edges_that_meet_are_all_found_in_their_order(count: int) -> None:
+    """On a coarse lattice corners lie on edges, edges along edges, and many cross; a circle crosses nothing."""
+    draw = np.random.default_rng(count)
+    for size in (2, 4, 1000):
+        corners = draw.integers(0, size, (count, 2)).astype(float)
+        assert [*geometry.self_crossings(corners)] == meeting(corners)
+    turn = np.linspace(0.0, 2.0 * np.pi, 4000, endpoint=False)
+    assert [*geometry.self_crossings(np.stack([np.cos(turn), np.sin(turn)], axis=1))] == []

@@ -93,6 +93,8 @@ def cut_courses(
             raise UnfitError("openings", "openings or lintels reach into each other")
         lintels = [cut.lintel for cut in own if cut.lintel is not None]
         found += sorted([*_left_over(pieces, own, width, gap), *lintels])
+    if not found:
+        raise UnfitError("openings", f"nothing is left of {wall}; make an opening smaller")
     return found
 
 

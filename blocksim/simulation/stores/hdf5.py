@@ -5,10 +5,12 @@ types, before the file switches to single-writer-multiple-reader mode, and only 
 is followed by a new value of `n_committed`. HDF5 cannot recover from a write that fails, so space is reserved before.
 """
 
+import errno
 import io
 import itertools
 import math
 import os
+import re
 import struct
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -131,9 +133,17 @@ def refuse_damage(path: Path, what: str) -> Iterator[None]:
     try:
         yield
     except DAMAGE as error:
-        text = " ".join(str(error).split())
-        text = text if len(text) <= LONGEST_CAUSE else f"{text[:LONGEST_CAUSE]} ..."
-        raise InvalidInputError(f"{path}: {what}: {text}") from error
+        raise InvalidInputError(f"{path}: {what}: {_cause(error)}") from error
+
+
+def _cause(error: Exception) -> str:
+    """Return what the system says, which HDF5 wraps in a text of its own, else the beginning of that, in a line."""
+    found = re.search(r"errno = (\d+)", str(error))
+    number = getattr(error, "errno", None) or (int(found[1]) if found else 0)
+    if number == errno.ENOLCK:
+        return f"{os.strerror(number)}; where the file system has none, set HDF5_USE_FILE_LOCKING=FALSE"
+    text = os.strerror(number) if number else " ".join(str(error).split())
+    return text if len(text) <= LONGEST_CAUSE else f"{text[:LONGEST_CAUSE]} ..."
 
 
 @contextmanager
@@ -378,6 +388,8 @@ def _contacts(path: Path, file: Any, frames: int, bodies: int) -> trajectory.Con
     return trajectory.Contacts(ends, rows)
 
 
+failures: list[Exception] = []
+"""What HDF5 could not write, with its objects: it may crash where one is closed, and as the process ends."""
 FLUSH_SECONDS = 0.25
 APART = 10.0  # times what the last flush took: a tenth of a run at most
 RESERVE = 1 << 18  # bytes
@@ -404,7 +416,7 @@ class FrameFile(AbstractContextManager["FrameFile"]):
             for name, units in ((name, one.units.items()) for name, one in self.probes.series().items())
         }
         self.count = 0
-        self.is_broken = False
+        self.is_broken = self.has_failed = False
         self.waiting: list[instruments.Frame] = []
         self.flushed_at = -np.inf
         self.flush_seconds = 0.0
@@ -425,8 +437,8 @@ class FrameFile(AbstractContextManager["FrameFile"]):
                     self.sync()
                 unnamed.chmod(files.permissions_of(path) or files.permissions_of(unnamed) or files.PERMISSIONS)
                 unnamed.replace(path)
-            except BaseException:
-                with suppress(OSError, RuntimeError):
+            except BaseException as error:
+                if not isinstance(error, OSError | RuntimeError | OutputError):
                     self.file.close()
                 unnamed.unlink(missing_ok=True)
                 raise
@@ -515,9 +527,9 @@ class FrameFile(AbstractContextManager["FrameFile"]):
         try:
             yield
         except (OSError, RuntimeError) as error:
-            self.is_broken = True
-            number = getattr(error, "errno", None)
-            raise OutputError(f"{self.path}: cannot be written: {os.strerror(number) if number else error}") from error
+            self.is_broken = self.has_failed = True
+            failures.append(error)
+            raise OutputError(f"{self.path}: cannot be written: {_cause(error)}") from error
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -529,8 +541,9 @@ class FrameFile(AbstractContextManager["FrameFile"]):
     def close(self) -> None:
         """Commit, close the file normally, wait for the disk. Raises OutputError, once."""
         if self.is_broken:
-            with suppress(OSError, RuntimeError):
-                self.file.close()
+            if not self.has_failed:
+                with suppress(OSError, RuntimeError):
+                    self.file.close()
             return
         self.commit()
         with self._locate_errors():

@@ -124,6 +124,25 @@ def test_outlines_are_stored_once_and_rectangles_store_none(scenario: Scenario, 
         np.testing.assert_array_equal(stored[1], others[0].corners)
 
 
+def test_a_file_system_without_locks_is_told_what_to_set(scenario: Scenario, tmp_path: Path) -> None:
+    said = "Unable to open file (unable to lock file, errno = 37, error message = 'No locks available')"
+    remedy = r"run\.h5: .*No locks available; where the file system has none, set HDF5_USE_FILE_LOCKING=FALSE$"
+
+    def refuse(*_: object, **__: object) -> None:
+        raise BlockingIOError(said)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(h5py, "File", refuse)
+        with pytest.raises(OutputError, match=remedy):
+            opened(tmp_path / "run.h5", place_bodies(scenario))
+    with opened(tmp_path / "run.h5", place_bodies(scenario)) as sink:
+        add_frames(sink, 0, 4)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(h5py, "File", refuse)
+        with pytest.raises(InvalidInputError, match=remedy):
+            read_frames(tmp_path / "run.h5", scenario)
+
+
 def test_full_disk_is_one_message_and_the_file_stays_readable(
     scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
