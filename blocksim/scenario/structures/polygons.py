@@ -8,7 +8,7 @@ from pydantic import ModelWrapValidatorHandler, PrivateAttr, ValidationError, Va
 
 from blocksim.errors import BlocksimError
 from blocksim.extras import load_module
-from blocksim.scenario import geometry, input_files, mistakes, units as q
+from blocksim.scenario import geometry, input_files, units as q
 from blocksim.scenario.models.base import Identifier, Table, setting, table_path
 from blocksim.scenario.models.geometry import COUNTS, Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure
@@ -97,11 +97,13 @@ def _drawn_block(one: DrawingOutline, unit: float) -> DrawnBlock:
     try:
         return DrawnBlock.model_validate(data)
     except ValidationError as error:
-        first = mistakes.mistakes_of(error, data)[0]
-        key, *corner = first.path
+        first = error.errors(include_url=False)[0]
+        own = first.get("ctx", {})  # of errors of this package, which give a key and a message
+        key, *corner = (*first["loc"], *own.get("key", ()))
         if key == "outline":
             key = f"corner {place_text(*one.outline[int(corner[0])])}" if corner else ""
-        raise DrawingError(f"{', '.join(filter(None, (one.name, str(key))))}: {first.message}") from None
+        message = own.get("message", first["msg"])
+        raise DrawingError(f"{', '.join(filter(None, (one.name, str(key))))}: {message}") from None
 
 
 class Polygons(PolygonStructure):

@@ -5,8 +5,8 @@ press against bodies, how far they have come, their surface, smoothed pressure.
 
 On a rough base the lowest rows of particles do not press as they should: the active thrust on blocks that yield is too
 small, the more the fewer rows there are, the farther blocks have moved, the more their backs are battered, and more
-with raw gradients than with corrected ones. On a smooth base neither lacks anything from 8 rows on. Soil at rest presses
-as it should.
+with raw gradients than with corrected ones. On a smooth base neither lacks anything from 8 rows on. Soil at rest
+presses as it should.
 """
 
 import math

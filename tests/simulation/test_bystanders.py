@@ -1,0 +1,46 @@
+"""What else is in a scene of rigid contacts changes no bit of what happens elsewhere, at a given step and tolerance."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from blocksim.simulation.schemes import build_scene
+from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
+
+AWAY = 5.0  # m
+TIME = {"scheme": "nonsmooth", "step": 1e-3, "substeps": 4, "velocity_tolerance": 1e-6, "stop_at_rest": False}
+BYSTANDERS: list[dict[str, Any]] = [
+    *({"x": AWAY + 2.0 * k * WIDTH, "y": HEIGHT / 2} for k in range(9)),
+    {"x": AWAY, "y": 3.0, "velocity": [0.3, 0.1], "spin": "20 deg/s"},
+]
+
+
+def scene_of(seed: int) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """Return one to six blocks that fly, stand on one another or side by side, and how they touch."""
+    random = np.random.default_rng(seed)
+    bodies: list[dict[str, Any]] = []
+    for k in range(int(random.integers(1, 7))):
+        row, column = divmod(k, 3)
+        bodies.append({"x": column * WIDTH * random.choice([1.0, 1.02]), "y": (row + 0.5) * HEIGHT})
+    bodies[0] |= {"velocity": [float(random.uniform(-1.0, 1.0)), 0.0]}
+    bodies[-1] |= {"y": bodies[-1]["y"] + 0.01, "spin": f"{random.uniform(-90.0, 90.0)} deg/s"}
+    impacts = "sequential" if seed % 2 else "simultaneous"
+    return bodies, {"impacts": impacts, "restitution": float(random.choice([0.0, 0.2, 0.5, 0.501, 0.8]))}
+
+
+def end_of(bodies: list[dict[str, Any]], contact: Mapping[str, object], **tables: Any) -> NDArray[np.float64]:
+    """Return the states of bodies after 0.1 s."""
+    scenario = scenario_of(bodies, contact=contact, time=TIME, **tables)
+    return Simulation(build_scene(scenario)).to_time(0.1).state()
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_blocks_and_loads_far_away_change_no_bit(seed: int) -> None:
+    bodies, contact = scene_of(seed)
+    alone = end_of(bodies, contact)[: len(bodies)]
+    load = {"kind": "force", "body": str(len(bodies) + 1), "magnitude": "1 mN", "direction": "0 deg"}
+    loaded = end_of([*bodies, *BYSTANDERS], contact, loads=[load])
+    assert loaded[: len(bodies)].tolist() == alone.tolist()
