@@ -376,7 +376,7 @@ def test_shear_is_held_back_after_some_dozen_sweeps(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(passes, "sweep", lambda *_: calls.append("sweep"))
     monkeypatch.setattr(passes, "agree", lambda *_: math.inf)
     monkeypatch.setattr(passes, "hold_back", lambda *_: calls.append("hold back"))
-    counts = {"sweeps": 0, "passes": 0, "unsolved": 0, "worst_residual": 0.0}
+    counts = {"sweeps": 0, "passes": 0, "unsolved": 0, "worst_residual": 0.0, "has_held": 1}
     contacts: Any = record(stepping=[record(velocity_sweeps=1000, **counts)])
     passes.velocity_pass(contacts, None, 0, 0, 1e-9)  # type: ignore[arg-type]
     assert 16 < calls.index("hold back") < 150

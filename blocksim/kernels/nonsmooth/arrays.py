@@ -136,6 +136,7 @@ STEPPING = record_type(
     "is_shaken "  # flag: supports or driven bodies move, so that impulses on them do work
     "has_forgotten "  # flag: impulses of what pressed are forgotten in the current interval, after an impact
     "has_rebounds "  # flag: anything rebounds in the current substep
+    "has_held "  # flag: shear of the current pass goes a share of its way
     "has_gain",  # flag: the last round has created energy in a group
 )
 PUSH = record_type(

@@ -526,6 +526,8 @@ def hold_back(contacts: arrays.Contacts, team: Integers, k: int, is_late: bool) 
             pack.is_coupled = is_late and not is_all(
                 coupling(pack, None, packs.link_of(contacts, pack, None)) <= STRONG
             )
+        if pack.is_coupled:
+            contacts.stepping[0].has_held = 1  # the same by every thread
     barrier(team)
 
 
@@ -542,11 +544,13 @@ def velocity_pass(contacts: arrays.Contacts, team: Integers, k: int, task: int, 
         largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
         task = VELOCITY
     is_solved = largest <= tolerance
-    if sweeps > LATE:  # whatever it leaves, within the cone
+    if sweeps > LATE:
         hold_back(contacts, team, k, False)
-        sweeps += 1
-        largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
+        if stepping.has_held:  # whatever it leaves, within the cone
+            sweeps += 1
+            largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
     if k == 0:
+        stepping.has_held = 0
         stepping.sweeps += sweeps
         stepping.passes += 1
         stepping.residual = largest
