@@ -163,13 +163,13 @@ def _statics(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:
             yield "statics    no equilibrium: it cannot stand as it is placed"
             return
         margin, estimate = margins
-        yield "statics    an equilibrium is possible; whether it is reached from rest, runs decide"
+        yield "statics    an equilibrium is possible; whether it is reached, runs decide"
         if math.isfinite(margin):
             yield f"           up to a horizontal acceleration of {margin:.3g} g at most"
         else:
-            about = f", at about {estimate:.3g} g, an estimate" if math.isfinite(estimate) else ""
-            yield "           statics sets no bound on a horizontal acceleration:"
-            yield f"           joints that slip without opening may give way{about}"
+            about = f", at about {estimate:.3g} g (an estimate)" if math.isfinite(estimate) else ""
+            yield "           statics sets no bound on a horizontal acceleration: joints that slip"
+            yield f"           without opening may give way{about}"
 
 
 def _unscaled(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:

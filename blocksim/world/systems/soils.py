@@ -40,7 +40,7 @@ SMOOTHING = 1.5  # smoothing length in spacings
 USUAL_DEPTH = 1.0  # m, out of the plane, where there are no blocks
 # calibrated with smooth upright walls drawn back from 10 to 20 rows of 21.9 degrees on a rough base by 1 and 3 % of the
 # height: a, b of the share a/rows + b of the active thrust that is missing
-LACK = {"raw": ((2.2, 0.0), (2.7, 0.05)), "corrected": ((0.9, -0.006), (1.36, 0.026))}
+LACK = {"raw": ((2.2, 0.0), (2.5, 0.07)), "corrected": ((0.9, -0.006), (1.36, 0.026))}
 COURANT = 0.4  # step in smoothing lengths that a wave passes
 LOSSES = ("plastic", "viscosity", "dashpot", "friction", "settling", "ramp")
 ENERGIES = ("kinetic", "potential", "elastic", "contact", *LOSSES)  # J, as kernels/soil/step.py measures them
