@@ -10,6 +10,7 @@ import pytest
 from blocksim import plot, static_limit
 from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.study.answer import study_in
+from blocksim.study.criterion import Stability
 from blocksim.study.limit import limit
 from blocksim.study.static_limit import NONE, POSSIBLE
 from blocksim.study.sweep import Replay
@@ -161,8 +162,8 @@ def test_a_limit_of_runs_begins_at_the_bound_and_says_it_and_a_scan_is_made_wher
     bound = f"no equilibrium above {topple:.7g} kN (statics)"
     assert bound in found.overview().lines
     (bracket,) = found.brackets  # runs that fall below and stand above would make no other bound of it
-    sides = {"below": bracket.below.model_copy(update={"verdict": "falls"})}
-    sides["above"] = bracket.above.model_copy(update={"verdict": "stands"})
+    sides = {"below": bracket.below.model_copy(update={"verdict": Stability.FALLS})}
+    sides["above"] = bracket.above.model_copy(update={"verdict": Stability.STANDS})
     wedged = found.model_copy(update={"brackets": (bracket.model_copy(update=sides),)})
     assert bound in wedged.overview().lines
     scanned = limit(slab(), vary, out=tmp_path / "scan", tolerance=0.5, scan=3, keep_runs=False, stiffer=False)
