@@ -18,7 +18,7 @@ from enum import StrEnum
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import spelling, units as q
-from blocksim.simulation import observables, results
+from blocksim.simulation import loop, observables, results
 from blocksim.study.rows import FINISHED
 
 STANDS = "--stands"
@@ -55,6 +55,7 @@ class Criterion:
     conditions: tuple[Callable[[Mapping[str, object]], bool], ...]
     least_moved: float | None = None  # m, the least displacement that any of them names
     has_passed: bool = False  # what acts on blocks, so that those that rock at the end may come to rest yet
+    stops_at_rest: bool = False  # a run that did not has not come to rest
 
     def holds(self, row: Mapping[str, object]) -> bool:
         """Return True if a row of a finished run meets all conditions."""
@@ -66,7 +67,10 @@ class Criterion:
             return Stability.FALLS
         if row["status"] != FINISHED:
             return Stability.FAILED
-        if self.has_passed and row.get(observables.OUTCOME) == observables.Response.ROCKING:
+        outcome = row.get(observables.OUTCOME)
+        is_slow = self.stops_at_rest and row["reason"] != loop.REST.reason  # as rocking blocks are where they turn back
+        rocks = outcome == observables.Response.ROCKING or (outcome == observables.Response.SLID and is_slow)
+        if self.has_passed and rocks:
             return Stability.UNDECIDED
         if not self.holds(row):
             return Stability.FALLS

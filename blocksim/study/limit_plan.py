@@ -460,7 +460,9 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
             raise InvalidInputError(message) from error
     if options.stands is None and plan.moves_supports:
         stands = criterion.read_criterion(criterion.OF_MOVING_SUPPORTS)
-    plan = replace(plan, criterion=replace(stands, has_passed=any(map(has_passed, at_ends))))
+    stops_at_rest = plan.scenario.time.stop_at_rest and not plan.moves_supports
+    judge = replace(stands, has_passed=any(map(has_passed, at_ends)), stops_at_rest=stops_at_rest)
+    plan = replace(plan, criterion=judge)
     start = bare.data.get("start")
     if (isinstance(start, Mapping) and "settle" in start) or not all(map(is_sustained, at_ends)):
         return plan

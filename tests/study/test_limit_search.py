@@ -234,6 +234,15 @@ def test_what_rocks_under_a_load_that_lasts_falls_and_is_undecided_after_a_pulse
     assert judged.verdict(ROW | {"outcome": "rocking"}) == ("undecided" if undecided else "falls")
 
 
+def test_a_thrown_block_that_turns_back_as_its_run_ends_is_undecided_unless_it_rests() -> None:
+    data = on_springs(start={"settle": False})
+    data["bodies"] = [data["bodies"][0] | {"spin": 0.1}]
+    options = LimitOptions({"bodies.0.spin": {"from": 0.1, "to": 1.0}})
+    judge = read_limit(document_of(data), options).criterion
+    assert judge.verdict(ROW) == "falls"  # slid, and at rest
+    assert judge.verdict(ROW | {"reason": "end of simulated time"}) == "undecided"
+
+
 def test_standing_means_not_fallen_where_supports_move_unless_it_is_said() -> None:
     vary = {"ground.tilt": {"from": "5 deg", "to": "40 deg"}}
     fallen = "outcome != fell"
