@@ -166,6 +166,11 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the findings in results/
 	$(BLOCKSIM) plot $(PICTURES)/arch --experiment scenarios/published/arch_thickness.csv --out results/arch_thickness.png
 	$(BLOCKSIM) run scenarios/soil/retaining_wall_falls.toml --quiet
 	$(BLOCKSIM) plot scenarios/soil/retaining_wall_falls.toml --out results/retaining_wall.png
+	$(BLOCKSIM) limit scenarios/tilting_wall.toml --vary ground.tilt=20deg:40deg --stands "outcome != fell" \
+	    --out $(PICTURES)/tilting_wall --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/tilting_wall --kind mechanism --out results/tilting_wall.png
+	$(BLOCKSIM) run scenarios/walls/pushed_granite_wall.toml --out $(PICTURES)/granite_wall --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/granite_wall --kind capacity --out results/granite_wall.png
 
 .PHONY: paper
 paper: $(RUN_STAMP) ## The paper's figures, tables and equations from the shipped scenarios, into results/paper

@@ -271,9 +271,9 @@ class StandingSide:
         if levels is not None:
             is_known = levels.stiff is not None or levels.problem
             return limit_answer.Margin(rest=rest, springs=0.0 if is_known else BEYOND * probed)
-        if self.give is not None:
-            return limit_answer.Margin(rest=rest, springs=self.give.share)
-        return limit_answer.Margin(rest=rest, springs=0.0 if plan.moves_supports else self.most_shift)
+        if plan.moves_supports:  # nothing says by how much
+            return limit_answer.Margin(rest=rest, springs=0.0)
+        return limit_answer.Margin(rest=rest, springs=self.most_shift if self.give is None else self.give.share)
 
 
 def slenderness(scenario: Scenario) -> float:
