@@ -1,6 +1,6 @@
 """Everything that must hold before a scenario may be used, and warnings of values that are hardly meant."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 from math import ceil, dist
 from pathlib import Path
@@ -128,7 +128,7 @@ LONGEST_DRAWN = 10.0  # m, of most blocks of a drawing: bricks and stones in mm 
 MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the square of the height
 
 
-def implausible_values(scenario: Scenario) -> list[str]:
+def implausible_values(scenario: Scenario, placed: Sequence[placement.PlacedBody] | None = None) -> list[str]:
     """Return a warning for each value that looks like one in another unit, of frictions swept ones too.
 
     Also for what was not read of drawings, for soils of whose width or height no whole number of particles takes all,
@@ -159,7 +159,8 @@ def implausible_values(scenario: Scenario) -> list[str]:
                 warnings.append(f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"')
             warnings += structure.remarks
     warnings += _friction_angles(scenario)
-    warnings += _impacts(scenario)
+    placed = placement.place_bodies(scenario) if placed is None else placed
+    warnings += _impacts(scenario, placed)
     for soil in placement.soil_tables(scenario):
         extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
         counts = geometry.count_across(soil.corners, soil.spacing)
@@ -170,7 +171,7 @@ def implausible_values(scenario: Scenario) -> list[str]:
                     f"{overrides.format_key(('soils', soil.name, 'spacing'))} = {1e3 * soil.spacing:.4g} mm fills "
                     f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
                 )
-    loose = support.support_warning(scenario)
+    loose = support.support_warning(scenario, placed)
     return [*warnings, *after_end.cut_off(scenario), *([loose] if loose else [])]
 
 
@@ -178,7 +179,7 @@ STRONG_RESTITUTION = 0.5  # beyond which simultaneous impacts were seen to creat
 BESIDE = 0.01  # of the smallest side: blocks no farther apart touch
 
 
-def _impacts(scenario: Scenario) -> Iterator[str]:
+def _impacts(scenario: Scenario, placed: Sequence[placement.PlacedBody]) -> Iterator[str]:
     """Yield that contact.impacts has no effect, or that blocks touch whose restitution asks for another value."""
     if not scenario.time.has_rigid_contacts:
         if scenario.contact.impacts == "sequential":
@@ -188,7 +189,7 @@ def _impacts(scenario: Scenario) -> Iterator[str]:
     restitution = max(scenario.contact.restitution.block_block, *pairs, 0.0)
     if restitution <= STRONG_RESTITUTION or scenario.contact.impacts == "sequential":
         return
-    free = [body for body in placement.place_bodies(scenario) if not body.fixed]
+    free = [body for body in placed if not body.fixed]
     one, other, _ = overlap.pairs_within(overlap.Outlines.of(free), BESIDE * placement.smallest_width(free))
     if one.size:
         yield (

@@ -1,10 +1,13 @@
 """Which blocks nothing carries at the start, and how far they are from what could."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import geometry, overlap, placement
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.placement import PlacedBody
 
 TOUCHING = 1e-3
 """Of the least width of all blocks: a wider gap is no joint; a block that falls through it lands at some cm/s."""
@@ -15,13 +18,13 @@ MOST_NAMED = 5
 Labels = NDArray[np.int64]
 
 
-def unsupported(scenario: Scenario, near: float) -> tuple[list[int], float]:
+def unsupported(scenario: Scenario, placed: Sequence[PlacedBody], near: float) -> tuple[list[int], float]:
     """Return the numbers of free blocks that rest on nothing, directly or over others, and the least gap (m) below it.
 
     Blocks touch within a distance `near` (m). Those that move at the start are thrown, and need no support; what soil
     surrounds has it.
     """
-    placed, segments = placement.place_bodies(scenario), placement.place_segments(scenario)
+    segments = placement.place_segments(scenario)
     pieces = [overlap.Outlines.along(segments)] if segments else []
     for soil in placement.soil_tables(scenario):
         low, high = np.array(geometry.box_of(soil.corners.tolist()))
@@ -64,12 +67,11 @@ def _spread(labels: Labels, one: Labels, other: Labels) -> Labels:
             roots = roots[roots]
 
 
-def support_warning(scenario: Scenario) -> str:
+def support_warning(scenario: Scenario, placed: Sequence[PlacedBody]) -> str:
     """Return a warning of blocks that fall at the start as they touch nothing below them; empty if there are none."""
-    placed = placement.place_bodies(scenario)
     if not scenario.gravity or not placed:
         return ""
-    loose, gap = unsupported(scenario, TOUCHING * placement.smallest_width(placed))
+    loose, gap = unsupported(scenario, placed, TOUCHING * placement.smallest_width(placed))
     if not loose:
         return ""
     free, names = sum(not body.fixed for body in placed), [placed[number].name for number in loose[:MOST_NAMED]]

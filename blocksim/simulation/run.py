@@ -307,7 +307,7 @@ def _convergence_warnings(scenario: Scenario, found: results.Convergence | None)
 def _warnings(
     scenario: Scenario, placed: Sequence[PlacedBody], ended: loop.LoopResult, settled: results.RestState | None
 ) -> Iterator[str]:
-    yield from check.implausible_values(scenario)
+    yield from check.implausible_values(scenario, placed)
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > balance.RESIDUAL_PROMISE:
         yield f"relative energy error {residual:.1e}, above {balance.RESIDUAL_PROMISE:g}"

@@ -298,7 +298,8 @@ def is_sustained(scenario: Scenario) -> bool:
     """Return True where loads are the same from time zero on, nothing moves then, and no block is to drop."""
     if why_not_sustained(scenario):
         return False
-    dropped, _ = support.unsupported(scenario, NEAR * smallest_width(place_bodies(scenario)))
+    placed = place_bodies(scenario)
+    dropped, _ = support.unsupported(scenario, placed, NEAR * smallest_width(placed))
     return not dropped
 
 

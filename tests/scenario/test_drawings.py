@@ -241,7 +241,8 @@ def test_parts_of_a_feature_have_names_of_their_own_and_numbers_are_names(tmp_pa
 def test_degrees_are_metres_only_where_that_is_said(tmp_path: Path) -> None:
     far = [[11.5 + 1e-5 * x, 48.1 + 1e-5 * y] for x, y in SQUARE]
     written(tmp_path, collection(feature(far)))
-    assert place_bodies(loaded(tmp_path))[0].size_x == pytest.approx(1e-7)
+    (tmp_path / "scene.toml").write_text(TEXT.replace("1 cm", "1 m"))
+    assert place_bodies(loaded(tmp_path))[0].size_x == pytest.approx(1e-5)
     (tmp_path / "scene.toml").write_text(TEXT.replace(', unit = "1 cm"', ""))
     with pytest.raises(ScenarioError, match=r"\(11\.5, 48\.1\) to \(11\.50001, 48\.10001\) look like degrees"):
         loaded(tmp_path)
