@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from blocksim.analysis.compare import plain
-from blocksim.analysis.curves import CurveTable, Envelope
+from blocksim.analysis.curves import STIFF, CurveTable, Envelope
 from blocksim.errors import InvalidInputError
 from blocksim.notebook import Shown
-from blocksim.scenario import Scenario, events
+from blocksim.scenario import Scenario, events, place_bodies, placement
 from blocksim.scenario.models.actuators import Actuator
 from blocksim.scenario.models.loads import Force
 from blocksim.simulation import Result, read_result
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 LEAST_SHARE = 1e-6  # of the displacement of the head: less is no way in that direction
 RISING = 0.9  # of the way: from there on a peak may be none, as the head slows down where the curve ends
 WINDOWS = 100  # over which changes of momentum are averaged
-SLOW = 0.01  # of work and of peak: more inertia than that is warned of
+SLOW = 0.01  # of work, peak and bound: more inertia, force of dashpots or excess than that is warned of
 
 
 class Capacity(NamedTuple):
@@ -49,7 +49,9 @@ class Capacity(NamedTuple):
     bound: float  # N, by statics
     kinetic_share: float  # kinetic energy over work done, at most, up to `fallen`
     inertia_share: float  # force of inertia over the peak, at most, up to there
+    dashpot_share: float  # loss in the dashpots of contacts over work done, until the end of the secant
     rises: bool  # whether the peak is where the curve ends
+    exceeds: bool  # whether the peak is above the bound by more than a change of geometry may bring
 
 
 class CapacityAnswer(Shown):
@@ -78,7 +80,19 @@ class CapacityAnswer(Shown):
             for one in self.all
             if max(one.kinetic_share, one.inertia_share) > SLOW
         )
-        return (*rising, *fast)
+        damped = (
+            f"{one.actuator}: dashpots of contacts take {one.dashpot_share:.1%} of the work up to {STIFF[1]:g} of the "
+            "peak, so that the stiffness may be too high; lower the rate, or raise contact.restitution"
+            for one in self.all
+            if one.dashpot_share > SLOW
+        )
+        above = (
+            f"{one.actuator}: the {one.sense} has its peak {one.peak / one.bound - 1.0:.1%} above the bound, "
+            f"at {1e3 * one.displacement:.4g} mm, too early for hardening: a jolt; lower the rate or time.step"
+            for one in self.all
+            if one.exceeds
+        )
+        return (*rising, *fast, *damped, *above)
 
     def to_frame(self) -> "pd.DataFrame":
         """Return one row a capacity, columns as in `Capacity`."""
@@ -115,6 +129,7 @@ def capacity(run: Result | Path | str) -> CapacityAnswer:
 
 def _capacities(result: Result) -> Iterator[Capacity]:
     scenario, records = result.scenario, records_of(result.probes)
+    side = placement.smallest_width(place_bodies(scenario))
     for name, actuator in zip(events.actuator_names(scenario), scenario.actuators, strict=True):
         record = records[name]
         far = float(np.abs(record["head"]).max(initial=0.0))
@@ -126,17 +141,22 @@ def _capacities(result: Result) -> Iterator[Capacity]:
             fallen = envelope.place_of_fall
             last = np.flatnonzero(reached >= (fallen if math.isfinite(fallen) else reached.max()))[0]
             shares = _shares_of_motion(result.frames, record, actuator, float(record.time[last]), envelope.peak)
+            bound, place = bound_of(scenario, actuator, sign), sign * envelope.place_of_peak
+            # geometry changes forces by shares of about what the point has moved over a side
+            most = (1.0 + SLOW + abs(place) / side) * bound
             yield Capacity(
                 name,
                 sense,
                 envelope.peak,
-                sign * envelope.place_of_peak,
+                place,
                 sign * fallen,
                 envelope.stiffness if scenario.time.has_springs else math.nan,
                 float(record["work"][-1]),
-                bound_of(scenario, actuator, sign),
+                bound,
                 *shares,
+                _dashpot_share(result.frames, record, sign, envelope.peak),
                 envelope.place_of_peak > RISING * float(envelope.x[-1]),
+                envelope.peak > most,
             )
 
 
@@ -153,6 +173,8 @@ def _shares_of_motion(
     frames: Frames, record: ProbeSeries, actuator: Actuator, until: float, peak: float
 ) -> tuple[float, float]:
     """Return kinetic energy over the work done and inertia over the peak (N), the largest until a time (s)."""
+    if not (until > 0.0 < peak):
+        return math.nan, math.nan
     early, mass = frames.time <= until, np.nan_to_num(frames.mass if frames.mass is not None else np.zeros(1))
     work = float(np.interp(until, record.time, record["work"]))
     kinetic = float(frames.energy["kinetic"][early].max(initial=0.0))
@@ -163,19 +185,28 @@ def _shares_of_motion(
     return kinetic / work if work > 0.0 else math.nan, float(np.abs(force).max()) / peak
 
 
+def _dashpot_share(frames: Frames, record: ProbeSeries, sign: float, peak: float) -> float:
+    """Return what dashpots lose over the work done until the force has come to STIFF of its peak (N); NaN for none."""
+    until = record.time[np.flatnonzero(sign * record["force"] >= STIFF[1] * peak)[0]]
+    work = float(np.interp(until, record.time, record["work"]))
+    if "dashpot" not in frames.energy or not work > 0.0:
+        return math.nan
+    return float(np.interp(until, frames.time, frames.energy["dashpot"])) / work
+
+
 def bound_of(scenario: Scenario, actuator: Actuator, sign: float) -> float:
     """Return the force (N) beyond which no equilibrium carries what an actuator exerts; NaN where statics has none."""
     blockwork, programme = (solver_module(f"statics.{name}") for name in ("blockwork", "programme"))
-    force = {"body": actuator.body, "magnitude": sign, "direction": f"{actuator.direction!r} rad"}
-    unit = Force.model_validate({"kind": "force", "point": actuator.point, **force})
+    alone = scenario.model_copy(update={"actuators": ()})
     with suppress(InvalidInputError):
-        at_rest, pushed = (
-            blockwork.Blockwork.of(scenario.model_copy(update={"actuators": (), "loads": (*scenario.loads, *more)}))
-            for more in ((), (unit,))
-        )
+        at_rest = blockwork.Blockwork.of(alone)
+        weight = float(at_rest.gravity * at_rest.masses.sum()) or 1.0  # N: a small force is round-off beside it
+        force = {"body": actuator.body, "magnitude": sign * weight, "direction": f"{actuator.direction!r} rad"}
+        unit = Force.model_validate({"kind": "force", "point": actuator.point, **force})
+        pushed = blockwork.Blockwork.of(alone.model_copy(update={"loads": (*scenario.loads, unit)}))
         found = programme.Programme(at_rest).greatest(at_rest.forces, pushed.forces - at_rest.forces)
         if found is not None and found.factor > 0.0:
-            return float(found.factor)
+            return weight * float(found.factor)
     return math.nan
 
 

@@ -10,6 +10,11 @@ from blocksim.study.capacity import bound_of
 
 WIDTH, HEIGHT = 0.1, 0.2  # m
 WEIGHT = 1000 * WIDTH * HEIGHT * 0.1 * 9.81  # N
+THERE_AND_BACK = {  # at rest at zero, where a block that goes on is struck by its other edge
+    "kind": "table",
+    "times": [0.0, 2.0, 4.0, 6.0, 8.0, 10.0],
+    "displacements": [0.0, 0.005, 0.0, 0.0, -0.005, 0.0],
+}
 CYCLES = {"kind": "cycles", "amplitudes": ["5 mm"], "rate": "5 mm/s"}
 
 
@@ -33,13 +38,14 @@ def rocked(path: dict[str, Any], **tables: Any) -> Scenario:
 
 def test_a_rocking_block_has_the_peak_of_statics_in_both_directions() -> None:
     """W b/2h; where it is pushed farther it falls as W (b/2 - x/2) does, x at half of the height."""
-    answer = blocksim.capacity(blocksim.run(rocked(CYCLES)))
+    answer = blocksim.capacity(blocksim.run(rocked(THERE_AND_BACK)))
     push, pull = answer.all
     assert (push.sense, pull.sense) == ("push", "pull")
     for one, sign in ((push, 1.0), (pull, -1.0)):
         assert one.bound == pytest.approx(0.5 * WEIGHT * WIDTH / HEIGHT, rel=1e-6)
         assert one.peak == pytest.approx(one.bound, rel=0.01)
         assert 0.0 < sign * one.displacement < 1e-3
+        assert not one.exceeds
     assert answer.to_frame()["peak"].tolist() == [push.peak, pull.peak]
     picture = answer.plot("capacity")._repr_png_()
     assert picture is not None
@@ -77,6 +83,36 @@ def test_an_actuator_keeps_its_own_record_beside_a_probe_of_another_name() -> No
 def test_a_run_that_is_not_slow_is_warned_of() -> None:
     answer = blocksim.capacity(blocksim.run(rocked({"kind": "ramp", "to": "30 mm", "rate": "500 mm/s"})))
     assert "a lower rate is nearer to statics" in answer.warnings[0]
+
+
+def test_a_jolt_above_the_bound_of_statics_is_warned_of() -> None:
+    """A block that passes zero at speed is struck by its other edge."""
+    answer = blocksim.capacity(blocksim.run(rocked(CYCLES)))
+    assert [one.exceeds for one in answer.all] == [False, True]
+    assert "pull has its peak" in answer.warnings[-1]
+
+
+def test_the_bound_of_statics_is_there_whatever_blocks_weigh() -> None:
+    """A block a thousand times as large in all directions, 10^5 times as dense."""
+    large = {"b": {"width": 1e3 * WIDTH, "height": 1e3 * HEIGHT, "length": 100.0, "material": "oak"}}
+    bodies = [{"block": "b", "name": "b", "x": 0.0, "y": 0.5e3 * HEIGHT}]
+    jacks = [{"body": "b", "point": [0, 0.5e3 * HEIGHT], "displacement": CYCLES}]
+    dense = {"oak": {"density": 1e8, "young_modulus": 1e9, "poisson_ratio": 0.3}}
+    scenario = rocked(CYCLES, blocks=large, bodies=bodies, actuators=jacks, materials=dense)
+    assert bound_of(scenario, scenario.actuators[0], 1.0) == pytest.approx(0.5e14 * WEIGHT * WIDTH / HEIGHT, rel=1e-6)
+
+
+def test_dashpots_that_carry_a_part_of_the_force_are_warned_of() -> None:
+    springs = {"time": {"scheme": "explicit", "stop_at_rest": False}, "output": {"every": "0.2 ms"}}
+    shares = []
+    for restitution in (0.0, 0.9):
+        contact = {"restitution": restitution, "stiffness_scale": 1e-3}
+        path = {"kind": "ramp", "to": "1 mm", "rate": "50 mm/s"}
+        answer = blocksim.capacity(blocksim.run(rocked(path, contact=contact, **springs)))
+        shares.append(answer.all[0].dashpot_share)
+        assert any("dashpots of contacts" in text for text in answer.warnings) == (shares[-1] > 0.01)
+    assert shares[0] > 0.1
+    assert 0.0 < shares[1] < 0.01
 
 
 def test_a_curve_that_still_rises_at_its_end_is_warned_of() -> None:
