@@ -256,7 +256,7 @@ def actuator_sampler(number: int) -> Sampler:
         pieces = world.load_pieces[load.first_piece : load.last_piece]
         piece = pieces[max(0, int(np.searchsorted(pieces["start"], moment.time, side="right")) - 1)]
         since = moment.time - piece.start
-        head = piece.value + since * (piece.rate + 0.5 * since * piece.acceleration)
+        head = piece.value + since * (piece.rate + since * (0.5 * piece.acceleration + since * piece.jerk / 6.0))
         return float(force), float(way), float(head), float(load.work)
 
     return sample

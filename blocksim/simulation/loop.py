@@ -110,7 +110,7 @@ class Timeline:
             if load.kind == arrays.LOAD_ACTUATOR:  # it lets go, and its head stops
                 value, load.stiffness, load.damping = value_at(world, load, now), 0.0, 0.0
             piece.start, piece.value = now, value  # from now on
-            piece.rate = piece.acceleration = 0.0
+            piece.rate = piece.acceleration = piece.jerk = 0.0
             load.first_piece = last
             controls.loads_end = world.load_pieces["start"][world.loads["last_piece"] - 1].max()
         if event.velocity is not None:

@@ -196,7 +196,8 @@ class _Settlement:
             self.bodies[name][self.held] = 0
         world.controls["motion_x"] = world.controls["motion_y"] = 0.0
         world.controls["rest_checks"] = 0
-        world.load_pieces["rate"] = world.load_pieces["acceleration"] = 0.0
+        for name in ("rate", "acceleration", "jerk"):
+            world.load_pieces[name] = 0.0
         for name in SPRINGS:  # actuators are attached once all is at rest
             world.loads[name] = 0.0
         world.loads["last_piece"] = world.loads["first_piece"] + 1

@@ -19,7 +19,7 @@ from blocksim.kernels.common import arrays, tolerances
 from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
 from blocksim.kernels.explicit import models
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
-from blocksim.scenario import PlacedBody, Scenario, laws, motion
+from blocksim.scenario import PlacedBody, Scenario, laws, motion, placement
 from blocksim.world import excitation, interactions, memory
 from blocksim.world.bodies import Layout, body_records, layout_of, motion_records, place_particles, slots_of_a_pair
 from blocksim.world.step import MOST_STEPS, Bounds, Stride, bounds_of, choose_stride
@@ -33,6 +33,7 @@ SURFACE = "surface"  # the model without particles
 CHECKS = 500  # of rest, overlap and finiteness, in the time that rest must last
 CHEAP_CHECKS = 50  # steps between checks, from which on they cost almost nothing; where steps are long,
 FEWEST_CHECKS = 50  # in that time at least
+HALFWAY = 0.5  # of the smallest side: what is driven into a rigid contact comes no farther between checks
 LONGEST_HOLD = 5.0  # ends of the run, as which a longer time that rest must last counts, and none
 LEAST_PAIRS = 16
 LEAST_CELLS = 16
@@ -394,6 +395,10 @@ def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
         hold = min(time.rest_hold or math.inf, LONGEST_HOLD * time.end)
         few = round(min(CHEAP_CHECKS, hold / FEWEST_CHECKS / step))  # of a quotient that may be infinite
         every = max(1, few, round(min(MOST_STEPS, hold / CHECKS / step)))
+        if not time.has_springs:  # those look at every overlap in every step
+            driven = max(excitation.drive_bounds(scenario)[0], excitation.greatest_head_speed(scenario)) * step
+            passing = HALFWAY * placement.smallest_width(layout.placed)
+            every = max(1, min(every, int(passing / driven))) if driven > 0.0 and layout.placed else every
         rest_checks = max(1, math.ceil(min(time.rest_hold / (every * step), MOST_STEPS))) if time.stop_at_rest else 0
         row = {
             "step": step,

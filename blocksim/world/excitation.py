@@ -57,6 +57,7 @@ def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
         record.base_x, record.base_y = body.ground_point(*actuator.point)
         record.least = 0.0 if actuator.sense == "push" else -math.inf
         record.most = 0.0 if actuator.sense == "pull" else math.inf
+        record.fastest = max(abs(one.rate) for one in path)
         record.first_piece, record.last_piece = len(rows), len(rows) + len(path)
         rows += path
         end = max(end, path[-1].start)

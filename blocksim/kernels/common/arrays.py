@@ -256,13 +256,14 @@ LOAD = record_type(
     "up_x up_y "  # -: against gravity as it is at the start
     "base_x base_y "  # m: where its point was at time zero
     "stiffness damping least most "  # N/m, N s/m, N, N: of an actuator, and between what its force is
+    "fastest "  # m/s: greatest rate of its head
     "work "  # J: that of an actuator on its body
     "last_fx last_fy last_torque",  # N, N, N m: in the last evaluation
     counters="first_piece last_piece",  # its pieces, from the first to before the last
     indices="body",
     flags="kind turns stays",  # flags: its force turns with the body; its line of action stays in space
 )
-LOAD_PIECE = record_type("start value rate acceleration")  # s, value, 1/s, 1/s2; see Stretch in models/loads.py
+LOAD_PIECE = record_type("start value rate acceleration jerk")  # s, value, 1/s, 1/s2, 1/s3; see models/loads.Stretch
 
 
 class World(NamedTuple):

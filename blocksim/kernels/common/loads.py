@@ -1,12 +1,13 @@
 """Loads: forces on single bodies and accelerations of all free bodies, as functions of time and pose.
 
-A load is a value over time (pieces of lines and parabolas) and what it does per value. Nothing is kept from step to
+A load is a value over time (pieces of lines and cubics) and what it does per value. Nothing is kept from step to
 step but the last force of each, for the trapezoid rule by which all work is tallied; so bits depend on time and pose
 alone. A load on one body is evaluated by the thread that has the body; accelerations of all bodies by every thread for
 its own.
 
 An actuator is a spring and a dashpot between its point of a body and a head that moves along a line; its value is the
-displacement of the head. Its force follows from pose and velocity.
+displacement of the head. Its force follows from pose and velocity, in the non-smooth scheme that before the kick: what
+gravity and the last impulses add to it depends on the number of the substep, and would make the force do so too.
 
 Potential energy is that in the gravity of the controls. What turned gravity does beyond that is work of a load.
 """
@@ -48,7 +49,7 @@ def value_at(world: arrays.World, load: arrays.Record, time: float) -> float:
     """Return the value of a load at a time (s): a factor, a level (m), a tilt (rad) or a displacement (m)."""
     piece = piece_at(world, load, time)
     since = time - piece.start
-    return piece.value + since * (piece.rate + 0.5 * since * piece.acceleration)
+    return piece.value + since * (piece.rate + since * (0.5 * piece.acceleration + since * piece.jerk / 6.0))
 
 
 @jit.rare_kernel
@@ -92,10 +93,27 @@ def thrust_of(load: arrays.Record, piece: arrays.Record, time: float, pose: Pose
     way = (pose.x + arm_x - load.base_x) * load.fx + (pose.y + arm_y - load.base_y) * load.fy
     speed = (pose.vx - pose.spin * arm_y) * load.fx + (pose.vy + pose.spin * arm_x) * load.fy
     since = time - piece.start
-    head = piece.value + since * (piece.rate + 0.5 * since * piece.acceleration)
-    rate = piece.rate + since * piece.acceleration
+    head = piece.value + since * (piece.rate + since * (0.5 * piece.acceleration + since * piece.jerk / 6.0))
+    rate = piece.rate + since * (piece.acceleration + 0.5 * since * piece.jerk)
     force = load.stiffness * (head - way) + load.damping * (rate - speed)
     return min(max(force, load.least), load.most)
+
+
+@jit.rare_kernel
+def speed_given(world: arrays.World, load: arrays.Record) -> float:
+    """Return a bound (m/s) of the speed that an actuator gives any point of its body; zero of other loads.
+
+    Its own point gets no faster than twice the head, which may turn back at once, and by all that the spring holds
+    twice the force over the dashpot; a point elsewhere as much more as a force there accelerates it.
+    """
+    body = world.bodies[load.body]
+    if load.kind != arrays.LOAD_ACTUATOR or load.damping == 0.0 or body.inverse_mass == 0.0:
+        return 0.0
+    arm = math.sqrt(load.x * load.x + load.y * load.y)
+    own = body.inverse_mass + arm * arm * body.inverse_inertia
+    farthest = body.inverse_mass + arm * body.radius * body.inverse_inertia
+    force = math.sqrt(load.last_fx * load.last_fx + load.last_fy * load.last_fy)
+    return 2.0 * (load.fastest + force / load.damping) * max(farthest / own, 1.0)
 
 
 @jit.rare_kernel
@@ -192,11 +210,18 @@ def tally_actuators(
 
 @jit.rare_kernel
 def accelerations(
-    world: arrays.World, lines: arrays.Records, pushes: arrays.Records, first: int, last: int, time: float
+    world: arrays.World,
+    lines: arrays.Records,
+    before: arrays.Records,
+    pushes: arrays.Records,
+    first: int,
+    last: int,
+    time: float,
 ) -> None:
-    """Write what loads give the bodies from `first` to before `last` at a time (s), their displacements in `lines`.
+    """Write what loads give the bodies from `first` to before `last` at a time (s).
 
-    `lines` and `pushes` are those of the non-smooth scheme; what was there before is kept as the last.
+    Their displacements are in `lines`, their velocities in `before`, those of the non-smooth scheme, as are `pushes`;
+    what was there before is kept as the last.
     """
     for i in range(first, last):
         one = pushes[i]
@@ -212,15 +237,17 @@ def accelerations(
                     pushes[i].ax += ax
                     pushes[i].ay += ay
         elif first <= load.body < last:
-            add_force(world, load, lines[load.body], pushes[load.body], time)
+            add_force(world, load, lines[load.body], before[load.body], pushes[load.body], time)
 
 
 @jit.rare_kernel
-def add_force(world: arrays.World, load: arrays.Record, line: arrays.Record, one: arrays.Record, time: float) -> None:
-    """Add what a load on one body gives it, at its place in the step so far."""
+def add_force(
+    world: arrays.World, load: arrays.Record, line: arrays.Record, then: arrays.Record, one: arrays.Record, time: float
+) -> None:
+    """Add what a load on one body gives it, at its place in the step so far, with its velocity before the kick."""
     body = world.bodies[load.body]
     cos, sin = shapes.turn(body.cos, body.sin, line.turned)
-    pose = Pose(body.x + line.dx, body.y + line.dy, cos, sin, line.vx, line.vy, line.spin)
+    pose = Pose(body.x + line.dx, body.y + line.dy, cos, sin, then.vx, then.vy, then.spin)
     fx, fy, torque = force_at(world, load, time, pose)
     load.last_fx = fx
     load.last_fy = fy

@@ -6,7 +6,7 @@ come since it was made is looked at again before any can have come too far.
 
 import math
 
-from blocksim.kernels.common import arrays, jit, neighbours, supports, tolerances
+from blocksim.kernels.common import arrays, jit, loads, neighbours, supports, tolerances
 from blocksim.kernels.explicit.models import near_slots
 
 MOST_SLOTS = 32  # of corners of a pair
@@ -149,6 +149,8 @@ def update_pairs(world: arrays.World) -> int:
             farthest = max(farthest, neighbours.travel(body, 0.0, 0.0))
     if math.isfinite(fastest) and 2.0 * controls.step * fastest > way:
         return arrays.TOO_FAST
+    for load in world.loads:
+        fastest = max(fastest, loads.speed_given(world, load))
     if not math.isfinite(fastest + farthest):  # the next check ends the run
         clock.next_update = clock.steps + tolerances.MOST_UNSEEN
         return arrays.REACHED

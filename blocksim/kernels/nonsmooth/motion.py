@@ -30,9 +30,10 @@ def load_states(scene: arrays.Nonsmooth) -> None:
     for i in range(scene.world.bodies.size):
         body = scene.world.bodies[i]
         state = scene.contacts.states[i]
-        state.vx = body.vx
-        state.vy = body.vy
-        state.spin = body.spin
+        before = scene.contacts.before[i]
+        state.vx = before.vx = body.vx
+        state.vy = before.vy = body.vy
+        state.spin = before.spin = body.spin
         state.inverse_mass = body.inverse_mass
         state.inverse_inertia = body.inverse_inertia
         state.dx = state.dy = state.turned = 0.0
@@ -52,7 +53,7 @@ def go_back(scene: arrays.Nonsmooth) -> None:
     half = 0.5 * contacts.stepping[0].substep
     count = world.bodies.size - 1
     if world.loads.size > 0:
-        loads.accelerations(world, contacts.states, scene.pushes, 0, count, 0.0)
+        loads.accelerations(world, contacts.states, contacts.before, scene.pushes, 0, count, 0.0)
     for i in range(count):
         state = contacts.states[i]
         if state.inverse_mass > 0.0:
@@ -200,7 +201,7 @@ def kick_by_loads(scene: arrays.Nonsmooth, number: int, first: int, last: int, s
     """
     h = scene.contacts.stepping[0].substep
     time = cuts.begin_of_interval(scene) + number * h
-    loads.accelerations(scene.world, scene.contacts.states, scene.pushes, first, last, time)
+    loads.accelerations(scene.world, scene.contacts.states, scene.contacts.before, scene.pushes, first, last, time)
     new = share * h
     old = last_share * h
     for i in range(first, last):

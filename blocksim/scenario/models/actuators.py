@@ -93,14 +93,14 @@ class Actuator(base.Table):
     displacement: AnyPath = setting("displacement of the head over time")
 
 
-SPEEDING_UP = 0.1
+SPEEDING_UP = 0.2
 """Of the time that a way would take at full speed: as long the head speeds up, and slows down at its end."""
 
 
 def stretches_of(path: AnyPath) -> tuple[loads.Stretch, ...]:
     """Return the displacement (m) of a head over time.
 
-    Its speed rises and falls evenly at both ends of every way, so that the masses that it moves are not struck.
+    Its speed rises and falls smoothly at both ends of every way, so that the masses that it moves are not struck.
     """
     match path:
         case RampPath():
@@ -115,11 +115,21 @@ def stretches_of(path: AnyPath) -> tuple[loads.Stretch, ...]:
         way = turn - place
         even, rate = abs(way) / path.rate, math.copysign(path.rate, way)
         short = SPEEDING_UP * even
-        pieces.append(loads.Stretch(at, place, 0.0, rate / short))
+        pieces += _change(at, short, place, 0.0, rate)
         pieces.append(loads.Stretch(at + short, place + 0.5 * rate * short, rate))
-        pieces.append(loads.Stretch(at + even, turn - 0.5 * rate * short, rate, -rate / short))
+        pieces += _change(at + even, short, turn - 0.5 * rate * short, rate, 0.0)
         at, place = at + even + short, turn
     return (*pieces, loads.Stretch(at, place, 0.0))
+
+
+def _change(start: float, length: float, value: float, before: float, after: float) -> tuple[loads.Stretch, ...]:
+    """Return the change of a rate (m/s) within a time (s): its acceleration grows evenly from zero and back to it."""
+    half, gain = 0.5 * length, after - before
+    middle = value + half * (before + gain / 6.0)
+    return (
+        loads.Stretch(start, value, before, 0.0, gain / half**2),
+        loads.Stretch(start + half, middle, before + 0.5 * gain, gain / half, -gain / half**2),
+    )
 
 
 CORNER = 0.05
@@ -127,7 +137,7 @@ CORNER = 0.05
 
 
 def _rounded(times: Sequence[float], values: Sequence[float]) -> tuple[loads.Stretch, ...]:
-    """Return straight lines between values (m) at times (s) with parabolas in place of corners, at rest at both ends.
+    """Return straight lines between values (m) at times (s) with curves in place of corners, at rest at both ends.
 
     The ways of the first and of the last interval are gone in a little less than their time.
     """
@@ -139,7 +149,7 @@ def _rounded(times: Sequence[float], values: Sequence[float]) -> tuple[loads.Str
     for ((begin, was), (at, value)), (_, (end, to)) in pairwise(lines):
         half = CORNER * min(at - begin, end - at) if times[0] < begin and end < times[-1] else min(at - begin, end - at)
         before, after = (value - was) / (at - begin), (to - value) / (end - at)
-        pieces.append(loads.Stretch(at - half, value - half * before, before, (after - before) / (2.0 * half)))
+        pieces += _change(at - half, 2.0 * half, value - half * before, before, after)
         pieces.append(loads.Stretch(at + half, value + half * after, after))
     return (*pieces[:-1], loads.Stretch(times[-1], values[-1], 0.0))
 

@@ -31,12 +31,13 @@ Times = tuple[q.NonNegativeTime, ...]
 
 
 class Stretch(NamedTuple):
-    """From `start` (s) on, until the next one: value + rate (t - start) + acceleration (t - start)^2 / 2."""
+    """From `start` (s) on, until the next one: value, its rate, acceleration, and the rate of that, all at `start`."""
 
     start: float
     value: float
     rate: float
     acceleration: float = 0.0
+    jerk: float = 0.0
 
 
 class Constant(base.Table):
