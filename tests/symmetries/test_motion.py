@@ -128,7 +128,7 @@ SCENES = {
     "kernel": (loose_wall, EXPLICIT, KERNEL, 0.2, 400),
     "hexagons": (leaning_column, EXPLICIT, {}, 0.2, 3000),
     "rigid wall": (loose_wall, RIGID, {}, 0.2, 100),
-    "rigid wall with rebounds": (loose_wall, RIGID, {}, 0.6, 30),
+    "rigid wall with rebounds": (loose_wall, RIGID, {"impacts": "sequential"}, 0.6, 30),
     "rigid hexagons": (leaning_column, RIGID, {}, 0.6, 100),
 }
 

@@ -181,6 +181,21 @@ def test_corners_meet_along_what_presses_a_third_body_and_else_where_they_overla
     assert (normal == pytest.approx((0.0, -1.0), abs=1e-12)) is pressed
 
 
+@pytest.mark.parametrize(
+    ("sunk", "deep", "passes"), [(1e-4, 1.5e-4, True), (1e-4, 6e-4, False), (1e-6, 1.5e-5, True), (1e-6, 1e-4, False)]
+)
+def test_step_is_climbed_that_is_no_higher_than_contacts_are_deep_and_blocks_uneven(
+    sunk: float, deep: float, passes: bool
+) -> None:
+    """A block has sunk into one and, past the joint by a hair, lies deeper (m) below the top of the next."""
+    blocks = [Block(), Block(0.032, deep - sunk), Block(5e-7, 0.025 - sunk)]
+    scene = posed(blocks)
+    constraints = {(int(one.a), int(one.b)): one for one in manifolds(scene, blocks)}
+    constraints[0, 2].normal_one = 1.0
+    find_all(scene)
+    assert (abs(float(constraints[1, 2].ny)) > 0.99) is passes
+
+
 @pytest.mark.parametrize("ground", ["half-plane", "piece", "block"])
 @pytest.mark.parametrize(("outline", "halfway"), [(HEXAGON, -30.0), (BRICK, -45.0), ((), -45.0)])
 def test_impulses_go_with_the_corner_that_a_block_rolls_over(outline: Corners, halfway: float, ground: str) -> None:
