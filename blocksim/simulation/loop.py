@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from blocksim.errors import ExitCode
-from blocksim.kernels.common import arrays
+from blocksim.kernels.common import arrays, tolerances
 from blocksim.kernels.common.loads import value_at
 from blocksim.scenario import PlacedBody, Scenario, events, open_faces
 from blocksim.scenario.models.timeline import Event
@@ -229,9 +229,13 @@ def diagnose(outcome: Outcome, code: int, scene: schemes.AnyScene, placed: Seque
             lost = ~np.all([np.isfinite(bodies[name]) for name in instruments.MOTION], axis=0)
             who = f"block {placed[int(np.argmax(lost))].name}" if lost.any() else _lost_system(scene)
         if not who:
-            speed = np.hypot(bodies["vx"], bodies["vy"])
+            speed = np.hypot(bodies["vx"], bodies["vy"]) + bodies["radius"] * np.abs(bodies["spin"])
             fastest = int(np.argmax(speed))
             who = f"the fastest is block {placed[fastest].name} with {speed[fastest]:.3g} m/s"
+        if code == arrays.TOO_FAST:  # see kernels/explicit/broad_phase.py
+            controls, width = world.controls[0], float(world.bodies["least_width"].min())
+            safe = 0.5 * min(float(controls.skin), tolerances.WAY_SHARE * width) / float(controls.step)
+            who += f", while {safe:.3g} m/s are safe: shorten time.step"
     return replace(outcome, reason=f"{reason} ({who}, step {int(world.clock[0].steps)})")
 
 

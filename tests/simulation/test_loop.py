@@ -105,6 +105,7 @@ def test_where_a_run_fails_depends_on_nothing_that_watches_it(soft: Shipped, tmp
 def test_overlap_of_rigid_contacts_names_its_pair() -> None:
     result = simulate(sliding({"time": {"scheme": "nonsmooth"}, "contact": {"max_overlap": 1e-12}}, end=0.01))
     assert result.summary.exit_code == ExitCode.NUMERICAL_FAILURE
+    assert result.reason.startswith("an overlap exceeds contact.max_overlap (")  # as given: no step is too long for it
     assert "(block below and the ground by " in result.reason or "(block below and block above by " in result.reason
     assert f"mm, step {result.summary.steps})" in result.reason
 

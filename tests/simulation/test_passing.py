@@ -150,6 +150,72 @@ def test_forced_step_in_which_a_block_could_pass_ends_the_run(speed: float) -> N
     assert result.summary.exit_code == ExitCode.NUMERICAL_FAILURE
     told = "moves too far in one step for its contacts to be detected (the fastest is block 1 with"
     assert f"{told} {speed:.3g}" in result.reason
+    safe = number_after("m/s, while", result.reason)
+    assert result.reason.endswith(f"while {safe:.3g} m/s are safe: shorten time.step, step 0)")
+    for share, is_detected in ((0.99, True), (1.01, False)):
+        step = share * safe / speed * result.summary.time_step_s
+        again = simulate(scene(bodies, 0.2 / speed, {}, {"step": step, "force_step": True}))
+        assert ("moves too far in one step" not in again.reason or again.summary.steps > 0) == is_detected
+
+
+def number_after(words: str, reason: str) -> float:
+    return float(reason.partition(words)[2].split()[0])
+
+
+RIGID = {"scheme": "nonsmooth"}
+SQUEEZED = "an overlap is as deep as one step takes at"
+
+
+def squeezed(direction: tuple[float, float], speed: float, time: Mapping[str, object]) -> Scenario:
+    """Return a block between two of 10 000 times its mass that close in on it, without gravity; elastic."""
+    small, big, gap = 0.05, 0.5, 0.05
+    far, length = 0.5 * (small + big) + gap, 1e-4 * (big / small) ** 2
+    bodies = [
+        {
+            "x": place * direction[0],
+            "y": 5.0 + place * direction[1],
+            "velocity": [rate * direction[0], rate * direction[1]],
+            "width": size,
+            "height": size,
+            "length": depth,
+        }
+        for place, rate, size, depth in (
+            (-far, speed, big, 1.0),
+            (0.0, 0.0, small, length),
+            (far + gap, -speed, big, 1.0),
+        )
+    ]
+    return scene(bodies, 0.1, {"impacts": "sequential"} if "scheme" in time else {}, time)
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0)])
+def test_light_block_that_heavy_ones_make_faster_than_foreseen_ends_the_run_with_the_step_that_helps(
+    direction: tuple[float, float],
+) -> None:
+    """It gains twice their speed at every blow, up to 141 times: no bound of speed before the start contains that."""
+    for speed in (2.0, 8.0):
+        scenario = squeezed(direction, speed, RIGID)
+        result = simulate(scenario)
+        assert (result.status, result.summary.exit_code) == ("failed", ExitCode.NUMERICAL_FAILURE)
+        assert result.reason.startswith(SQUEEZED)
+        assert "contact.max_overlap" not in result.reason
+        assert "(block " in result.reason
+        met, safe = number_after(SQUEEZED, result.reason), number_after("while", result.reason)
+        assert met > 2.0 * safe > 2.0 * speed
+        (end,) = run_ensemble([scenario])
+        assert end.outcome.reason == result.reason
+        shorter = simulate(squeezed(direction, speed, {**RIGID, "step": number_after("time.step to", result.reason)}))
+        place = (frames_of(shorter).x + frames_of(shorter).y) * sum(direction)
+        assert shorter.status == "finished"
+        assert np.all(np.diff(place, axis=1) > 0.0)
+
+
+def test_springs_that_a_squeezed_block_compresses_too_far_name_their_limit_as_no_step_changes_it() -> None:
+    time: dict[str, object] = {}
+    for _ in range(2):
+        result = simulate(squeezed((1.0, 0.0), 8.0, time))
+        assert result.reason.startswith("an overlap exceeds contact.max_overlap (block 2 and block 3 by 2.5")
+        time = {"step": 0.25 * result.summary.time_step_s}
 
 
 def test_run_ends_at_the_same_step_whatever_its_outputs_and_says_the_same_in_an_ensemble() -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from blocksim.kernels.common.arrays import REMOVED, Records
 from blocksim.kernels.nonsmooth import arrays, energy, step
 from blocksim.simulation import schemes, trajectory
-from blocksim.world import nonsmooth, sag
+from blocksim.world import nonsmooth, rigid_step, sag
 
 Floats = NDArray[np.float64]
 
@@ -110,6 +110,23 @@ def overlaps_of_constraints(scene: arrays.Nonsmooth) -> schemes.Overlaps:
     )
 
 
+def late_contact(scene: arrays.Nonsmooth, overlaps: schemes.Overlaps) -> str:
+    """Return that the step is too long where two blocks at its greatest safe speed do not come as deep; else nothing.
+
+    The limits of speed from before the start are left where heavy blocks drive light ones to and fro: what is struck in
+    a step moves on with its new velocity until contacts are found again. Stiffness is in proportion to 1/step squared.
+    """
+    step, deepest = float(scene.world.controls[0].step), float(np.nanmax(overlaps.depth))
+    way = rigid_step.SHARE * float(scene.world.bodies["least_width"].min())
+    if not deepest > 2.0 * way:
+        return ""
+    return (
+        f"an overlap is as deep as one step takes at {deepest / step:.3g} m/s, while {way / step:.3g} m/s are safe: "
+        "blocks became faster than foreseen, or light ones give way under heavy ones; shorten time.step to "
+        f"{step * way / deepest:.2g} s or less"
+    )
+
+
 def convergence(scene: arrays.Nonsmooth) -> dict[str, float]:
     """Return how well impulses were found so far."""
     stepping = scene.contacts.stepping[0]
@@ -165,6 +182,7 @@ NONSMOOTH = schemes.Scheme(
     measure=energy.measure_nonsmooth,
     contacts=nonsmooth_contacts,
     overlaps=overlaps_of_constraints,
+    lost_contact=late_contact,
     convergence=convergence,
     warning=lambda scene, overlap, side: sag.overlap_warning(overlap, sag.current_crush_depth(scene), side),
 )
