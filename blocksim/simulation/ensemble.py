@@ -3,7 +3,7 @@
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -102,7 +102,8 @@ def member_ends(
     tables = trajectory.final_values(motion, corners.reshape(*angles.shape, *corners.shape[1:]), angles).tolist()
     support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
     in_rows = [name for name, one in OBSERVABLES.items() if one.in_rows]
-    observables = observe(watch.ends(motion, support, seconds, turned), in_rows)
+    sunk = np.where(np.array(codes) == arrays.OVERLAP_LIMIT, measured[:, -1], 0.0)[:, np.newaxis]
+    observables = observe(replace(watch.ends(motion, support, seconds, turned), sunk=sunk), in_rows)
     ends: dict[int, MemberEnd] = {}
     for m, (code, in_play) in enumerate(zip(codes, in_play_of(scenes, range(count)), strict=True)):
         if code == arrays.PAIRS_FULL:

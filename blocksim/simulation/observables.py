@@ -17,9 +17,10 @@ shortest side. A scene
 All of this is relative to the support: what rides on a shaking table has not moved. Fixed and driven blocks do not
 count; a removed one stays where it was then. A run that `time.end` cuts short is reported as it is then; it moves on
 where some block, as fast as it is then, would be farther than that hundredth away within another tenth of the time. A
-run that failed has no outcome; one that an overlap has ended after the fall fell, if its energy adds up until then. The
-first mover is the block that has moved in the first frame in which any has (the farthest of several); members of
-ensembles keep no frames, but are looked at when those would be recorded, until one block has moved.
+run that failed has no outcome; one that an overlap has ended after the fall fell, if its energy adds up until then, and
+some block is lower by that overlap in addition: blocks that are pushed into the ground have not fallen. The first mover
+is the block that has moved in the first frame in which any has (the farthest of several); members of ensembles keep no
+frames, but are looked at when those would be recorded, until one block has moved.
 """
 
 from bisect import bisect_right
@@ -140,6 +141,7 @@ class Ends:
     first: Sequence[FirstMove | None]
     turned: Floats | None = None  # (m, b) or (m, 1) largest rotation on the way; None where it was not followed
     moved: Floats | None = None  # (m, b) largest displacement on the way; None where it was not followed
+    sunk: Floats | float = 0.0  # (m, 1) m, by how much blocks may be too low as their contacts are too deep
 
     @cached_property
     def shift(self) -> Floats:
@@ -185,7 +187,7 @@ class Ends:
 
 def _outcomes(ends: Ends) -> list[Response]:
     turn, shapes = np.radians(ends.turn_deg), ends.shapes
-    is_down = (turn > FALLEN_TURN) | (-ends.shift[:, 1] > FALLEN_SHARE * shapes.shortest)
+    is_down = (turn > FALLEN_TURN) | (-ends.shift[:, 1] - ends.sunk > FALLEN_SHARE * shapes.shortest)
     fell = np.any(shapes.is_free & is_down, axis=1)
     moved = np.any(shapes.shares(ends.way, turn) > 1.0, axis=1)
     turns_on, is_still = ends.go_on(ends.corner_speed), [one is None for one in ends.first]
@@ -381,9 +383,12 @@ class Movement(BaseModel, frozen=True, extra="allow"):
         def __getattr__(self, name: str) -> Any: ...
 
     @classmethod
-    def of(cls, watch: Watch, motion: Floats, support: tuple[float, float], time: float) -> "Movement | None":
-        """Return those of a run: its last frame (6, b), the velocity of the support (m/s) and the time (s) then."""
-        ends = replace(watch.ends(motion[None], np.array([support]), [time], watch.turned), moved=watch.moved)
+    def of(
+        cls, watch: Watch, motion: Floats, support: tuple[float, float], time: float, sunk: float = 0.0
+    ) -> "Movement | None":
+        """Return those of a run: last frame (6, b), velocity of the support (m/s) and time (s) then, `Ends.sunk`."""
+        ends = watch.ends(motion[None], np.array([support]), [time], watch.turned)
+        ends = replace(ends, moved=watch.moved, sunk=sunk)
         (values,) = observe(ends, [one.name for one in OBSERVABLES.values() if one.in_runs])
         return cls(**values) if values else None
 

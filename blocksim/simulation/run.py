@@ -241,8 +241,9 @@ def _result(
     frames = recorder.frames()
     world, step = ended.scene.world, recorder.time_step
     steps, ground = int(world.clock[0].steps), world.bodies[-1]
+    sunk = ended.overlap if ended.code == arrays.OVERLAP_LIMIT else 0.0
     movement = observables.Movement.of(
-        recorder.watch, recorder.held[-1].states[0], (ground.vx, ground.vy), steps * step
+        recorder.watch, recorder.held[-1].states[0], (ground.vx, ground.vy), steps * step, sunk
     )
     if movement is not None:
         outcome = loop.after_a_fall(ended.outcome, ended.code, ended.ledger, movement.values[observables.OUTCOME])
@@ -320,7 +321,7 @@ def _warnings(
     for number in ended.pending if ended.outcome.status == "finished" else ():
         what = events.describe_event(scenario.events[number])
         yield f"events.{number} has not happened, as nothing came to rest: {what}"
-    if ended.outcome.status == "finished" and placed:
+    if ended.outcome.status == "finished" and ended.code != arrays.OVERLAP_LIMIT and placed:
         sunk = schemes.scheme_of(ended.scene).warning(ended.scene, ended.overlap, placement.smallest_width(placed))
         if sunk:
             yield sunk

@@ -218,6 +218,25 @@ def test_springs_that_a_squeezed_block_compresses_too_far_name_their_limit_as_no
         time = {"step": 0.25 * result.summary.time_step_s}
 
 
+def test_block_that_is_driven_into_the_ground_has_not_fallen() -> None:
+    """It falls by 20 mm, is struck and would end 45 mm lower; half of its side is 25 mm."""
+    small, big, drop = 0.05, 0.5, 0.02
+    bodies: list[dict[str, object]] = [
+        {"y": 0.5 * small + drop, "width": small, "height": small, "length": 1e-4 * (big / small) ** 2},
+        {"y": small + drop + 0.05 + 0.5 * big, "width": big, "height": big, "length": 1.0, "velocity": [0.0, -0.5]},
+    ]
+    time: dict[str, object] = {**RIGID}
+    for status, outcome in (("failed", None), ("finished", "slid")):
+        scenario = scene(bodies, 0.2, {}, time, gravity=9.81)
+        summary = simulate(scenario).summary
+        assert summary.movement is not None
+        assert (summary.status, summary.movement.values["outcome"]) == (status, outcome)
+        (end,) = run_ensemble([scenario])
+        assert (end.outcome.reason, end.observables["outcome"]) == (summary.reason, outcome)
+        if status == "failed":
+            time["step"] = number_after("time.step to", summary.reason)
+
+
 def test_run_ends_at_the_same_step_whatever_its_outputs_and_says_the_same_in_an_ensemble() -> None:
     """Also where frames are wanted at every step: the overlap is then found at the last step of a compiled call."""
     scenario = thrown("fixed", 60.0, stiffness_scale=1e-3)
