@@ -122,4 +122,9 @@ def next_energy_check(done: int, bodies: int) -> int:
 
 def adds_up(ledger: EnergyLedger) -> bool:
     """Return True if a run may continue; not so where the residual is no number."""
-    return ledger.relative_residual <= RESIDUAL_LIMIT
+    return ledger.relative_residual <= RESIDUAL_LIMIT and not creates(ledger)
+
+
+def creates(ledger: EnergyLedger) -> bool:
+    """Return True if impacts have made energy, which none does: those of a velocity pass that ended unsolved may."""
+    return ledger.impacts < -RESIDUAL_LIMIT * ledger.in_play

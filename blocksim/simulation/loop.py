@@ -197,6 +197,12 @@ REST = Outcome("finished", "at rest", ExitCode.SUCCESS)
 RESIDUAL = Outcome(
     "failed", f"energy residual above {balance.RESIDUAL_LIMIT:.0%} of the energy in play", ExitCode.NUMERICAL_FAILURE
 )
+CREATED = Outcome(
+    "failed",
+    f"impacts created more than {balance.RESIDUAL_LIMIT:.0%} of the energy in play: shorten time.step, or lower the "
+    "restitution",
+    ExitCode.NUMERICAL_FAILURE,
+)
 
 BY_CODE = {
     arrays.REACHED: END_OF_TIME,
@@ -314,6 +320,8 @@ def last_step_of(end: float, step: float) -> int:
 def outcome_of(code: int, ledger: balance.EnergyLedger) -> Outcome:
     """Return what a run came to that was not interrupted: its status code, and whether its energy adds up."""
     outcome = BY_CODE[code]
+    if balance.creates(ledger) and outcome.status == "finished":
+        return CREATED
     return RESIDUAL if outcome.status == "finished" and not balance.adds_up(ledger) else outcome
 
 

@@ -23,6 +23,7 @@ from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
 from blocksim.simulation.instruments import Recorder
 from blocksim.simulation.interruption import interruptible, stop_requests
 from blocksim.simulation.loop import BY_CODE, RESIDUAL, Outcome, diagnose
+from blocksim.simulation.observables import Response
 from blocksim.simulation.provenance import state_hash
 from blocksim.simulation.schemes import (
     ALONE,
@@ -83,6 +84,18 @@ ENTRIES = dict.fromkeys(sorted(set(EnergyLedger.model_fields) - {"start", "in_pl
 def test_every_entry_is_in_the_residual(name: str) -> None:
     some = EnergyLedger(**{**ENTRIES, name: 4.0}, start=7.0, in_play=2.0)
     assert (some.residual, some.relative_residual) == (-3.0, 1.5)
+
+
+@pytest.mark.parametrize("code", [REACHED, OVERLAP_LIMIT])
+@pytest.mark.parametrize(("created", "is_sound"), [(0.04, True), (0.06, False)])
+def test_a_run_whose_impacts_create_energy_fails_and_did_not_fall_although_its_ledger_is_closed(
+    code: int, created: float, *, is_sound: bool
+) -> None:
+    ledger = EnergyLedger(kinetic=1.0 + created, potential=0.0, impacts=-created, start=1.0, in_play=1.0)
+    assert ledger.relative_residual < 1e-12
+    outcome = loop.after_a_fall(loop.outcome_of(code, ledger), code, ledger, Response.FELL)
+    assert (outcome.status == "finished") == is_sound
+    assert is_sound or code == OVERLAP_LIMIT or outcome.reason.startswith("impacts created more than 5% of the energy")
 
 
 def test_where_a_run_fails_depends_on_nothing_that_watches_it(soft: Shipped, tmp_path: Path) -> None:
