@@ -20,7 +20,7 @@ def _import_numba() -> None:
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "A Numba config file is found")
-            from numba.core import config  # noqa: PLC0415 - its first import
+            from numba import config  # noqa: PLC0415 - its first import
     finally:
         del sys.modules["yaml"]
         if reader is not None:

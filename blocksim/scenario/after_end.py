@@ -57,7 +57,7 @@ def _moments(stretches: Sequence[loads.Stretch]) -> list[float]:
     """Return the times (s) at which a value begins or ceases to change, or jumps; none where it is constant."""
     moments = []
     for one, after in pairwise(stretches):
-        if one.rate or one.acceleration:
+        if one.rate or one.acceleration or one.jerk:
             moments += [one.start, after.start]
         elif one.value != after.value:
             moments.append(after.start)

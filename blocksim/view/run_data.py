@@ -43,9 +43,10 @@ class LoadOverTime(NamedTuple):
         """Return its factor, or the tilt (rad) of gravity, at these times (s)."""
         starts, *terms = np.array(self.stretches).T
         piece = (np.searchsorted(starts, times, side="right") - 1).clip(min=0)
-        value, rate, acceleration = (one[piece] for one in terms)
+        value, rate, acceleration, jerk = (one[piece] for one in terms)
         since = times - starts[piece]
-        return np.where(times < self.end, value + since * (rate + 0.5 * acceleration * since), 0.0)
+        change = since * (rate + since * (0.5 * acceleration + since * jerk / 6.0))
+        return np.where(times < self.end, value + change, 0.0)
 
 
 BEYOND_REACH = 1e34

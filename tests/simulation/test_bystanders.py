@@ -21,10 +21,10 @@ BYSTANDERS: list[dict[str, Any]] = [
 def scene_of(seed: int) -> tuple[list[dict[str, Any]], dict[str, Any]]:
     """Return one to six blocks that fly, stand on one another or side by side, and how they touch."""
     random = np.random.default_rng(seed)
-    bodies: list[dict[str, Any]] = []
-    for k in range(int(random.integers(1, 7))):
-        row, column = divmod(k, 3)
-        bodies.append({"x": column * WIDTH * random.choice([1.0, 1.02]), "y": (row + 0.5) * HEIGHT})
+    pitch = WIDTH * float(random.choice([1.0, 1.02]))
+    bodies: list[dict[str, Any]] = [
+        {"x": k % 3 * pitch, "y": (k // 3 + 0.5) * HEIGHT} for k in range(int(random.integers(1, 7)))
+    ]
     bodies[0] |= {"velocity": [float(random.uniform(-1.0, 1.0)), 0.0]}
     bodies[-1] |= {"y": bodies[-1]["y"] + 0.01, "spin": f"{random.uniform(-90.0, 90.0)} deg/s"}
     impacts = "sequential" if seed % 2 else "simultaneous"

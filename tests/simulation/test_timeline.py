@@ -408,7 +408,7 @@ def test_what_is_to_drop_or_moves_already_does_not_settle_unasked_under_such_a_s
         result = simulate(stack("explicit", start={}, motion=motion, bodies=[body]))
         assert result.summary.settled is None
         assert result.frames.y[0, 0] == body["y"]
-        assert result.summary.warnings == ()
+        assert not any("settle" in text for text in result.summary.warnings)
 
 
 def test_what_closes_a_gap_and_then_rests_is_no_mechanism() -> None:

@@ -127,8 +127,8 @@ SCENES = {
     "particles": (loose_wall, EXPLICIT, PARTICLES, 0.2, 400),
     "kernel": (loose_wall, EXPLICIT, KERNEL, 0.2, 400),
     "hexagons": (leaning_column, EXPLICIT, {}, 0.2, 3000),
-    "rigid wall": (loose_wall, RIGID, {}, 0.2, 100),
-    "rigid wall with rebounds": (loose_wall, RIGID, {"impacts": "sequential"}, 0.6, 30),
+    "rigid wall": (loose_wall, RIGID, {}, 0.2, 35),  # as long as impacts have not multiplied round-off
+    "rigid wall with rebounds": (loose_wall, RIGID, {"impacts": "sequential"}, 0.6, 18),
     "rigid hexagons": (leaning_column, RIGID, {}, 0.6, 100),
 }
 

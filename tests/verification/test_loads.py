@@ -194,10 +194,10 @@ def test_rigid_blocks_slip_on_that_table_as_one_does(places: list[tuple[float, f
 
 def test_an_abrupt_pulse_on_springs_that_carry_nothing_of_it_is_warned_of_by_as_much_as_the_slip_is_off() -> None:
     abrupt = slab_under("explicit", (1.0, 0.25, 0.8, 0.7), "50 ms", start=0.2, stiffness_scale=0.1, **COSINE)
-    (warning,) = abrupt.summary.warnings
+    (warning,) = [text for text in abrupt.summary.warnings if " some " in text]
     told = float(warning.split(" some ")[1].split("%")[0])
     off = 100.0 * (abrupt.probes["point1"]["relative_dx"][-1] / SLIP - 1.0)
     assert 10.0 < off < 14.0
     assert told == pytest.approx(off, rel=0.2)
     stiff = slab_under("explicit", (1.0, 0.1, 0.2, 0.4), "50 ms", shape="rectangular", amplitude=5.0, duration=0.1)
-    assert not stiff.summary.warnings
+    assert not any(" some " in text for text in stiff.summary.warnings)

@@ -210,7 +210,7 @@ def test_automatic_step_holds_a_heavy_block_beside_the_middle_of_a_light_one_to_
     assert frames is not None
     assert 0.0375 - frames.y[-1, 1] < 1e-3 * 0.025
     assert abs(frames.rotation[-1]).max() < 1e-3  # rad
-    assert result.summary.warnings == ()
+    assert not any("heavy one" in text for text in result.summary.warnings)
 
 
 @pytest.mark.parametrize(("ratio", "is_warned"), [(5.0, False), (1e3, True)])
@@ -219,7 +219,7 @@ def test_a_run_warns_of_a_heavy_block_that_has_come_to_lie_on_a_light_one(ratio:
     scenario = heavy_on_light(ratio, x=0.008, gap=1e-4, step="auto")
     result = simulate(scenario)
     assert result.status == "finished"
-    assert ["a light block carries a heavy one" in text for text in result.summary.warnings] == [True] * is_warned
+    assert any("a light block carries a heavy one" in text for text in result.summary.warnings) is is_warned
 
 
 def test_a_block_so_far_away_that_its_corners_are_one_place_halves_its_load() -> None:

@@ -168,10 +168,13 @@ FAR = 1e9  # round-off | metre, metre per second
 # x10 and /10: test_face_of_body_a_has_to_be_better_by_a_tie
 TIE = 6.25e-6  # round-off | least half side of the pair
 # Corners nearer to one another meet, and a third body may show which faces do. Overlaps of a run are less.
+# /10: test_step_is_climbed_that_is_no_higher_than_contacts_are_deep_and_blocks_uneven
 NEAR_CORNER = 0.1  # cost | smaller inner radius
 # Overlaps no deeper than that do not show which faces of two corners meet: times the deepest of what presses them,
+# x10 and /10: test_step_is_climbed_that_is_no_higher_than_contacts_are_deep_and_blocks_uneven
 SAG = 2.0  # calibrated | deepest overlap
 # and beside that, as neighbours sink unequally. A step of that height is climbed.
+# x10 and /10: test_step_is_climbed_that_is_no_higher_than_contacts_are_deep_and_blocks_uneven
 UNEVEN = 2e-3  # calibrated | smaller inner radius
 # Two points with less between them are one. x10 and /10: test_two_points_with_next_to_nothing_between_them_are_one
 ONE_POINT = 1e-5  # round-off | smaller half perimeter of the boxes

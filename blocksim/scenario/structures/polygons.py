@@ -99,11 +99,11 @@ def _drawn_block(one: DrawingOutline, unit: float) -> DrawnBlock:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         own = first.get("ctx", {})  # of errors of this package, which give a key and a message
-        key, *corner = (*first["loc"], *own.get("key", ()))
+        key, *corner = [*map(str, first["loc"]), *map(str, own.get("key", ()))]
         if key == "outline":
             key = f"corner {place_text(*one.outline[int(corner[0])])}" if corner else ""
-        message = own.get("message", first["msg"])
-        raise DrawingError(f"{', '.join(filter(None, (one.name, str(key))))}: {message}") from None
+        message = own.get("message", f"{q.toml(first['input'])}{first['msg'].replace('Input should be', ' is not')}")
+        raise DrawingError(f"{', '.join(filter(None, (one.name, key)))}: {message}") from None
 
 
 class Polygons(PolygonStructure):

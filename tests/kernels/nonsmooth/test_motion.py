@@ -115,12 +115,13 @@ def test_velocity_of_a_block_that_rolls_does_not_depend_on_lengths_that_are_not_
     assert found[2] == pytest.approx(found[0], rel=1e-12)
 
 
-def test_steps_of_crowds_and_of_weak_rebounds_of_more_than_two_are_not_cut() -> None:
-    crowd = [{**HOPPING, "x": 0.1 * k} for k in range(13)]
-    assert cut_steps(single(crowd, restitution=0.9), 40) == 0
-    assert cut_steps(single(crowd[:3], restitution=0.5), 100) == 0
-    assert cut_steps(single(crowd[:2], restitution=0.5), 100) > 0
-    assert cut_steps(single(crowd[:1], restitution=0.9), 100) > 0
+@pytest.mark.parametrize("count", [1, 2, 3, 13])
+def test_steps_are_cut_where_impacts_are_sequential_however_many_blocks_there_are(count: int) -> None:
+    crowd = [{**HOPPING, "x": 0.1 * k} for k in range(count)]
+    for restitution in (0.5, 0.9):
+        for impacts, is_cut in (("sequential", True), ("simultaneous", False)):
+            run = single(crowd, restitution=restitution, contact={"impacts": impacts})
+            assert (cut_steps(run, 100) > 0) is is_cut
 
 
 FREQUENCY = 2.0  # 1/s
