@@ -1,6 +1,6 @@
 """Judgement of an ensemble, the members of a sweep, against the repeats of an experiment by all metrics.
 
-These are outcome, inside, prediction, validation, area and joint test.
+These are outcome, inside, prediction, validation and area.
 """
 
 from collections import Counter
@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, inf, isfinite, nan, sqrt
 from statistics import NormalDist
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from blocksim.analysis import compare, evidence as facts
 from blocksim.analysis.experiment import ExperimentTable
 from blocksim.errors import InvalidInputError
-from blocksim.extras import load_module
 from blocksim.notebook import Shown
 
 if TYPE_CHECKING:
@@ -34,7 +33,6 @@ ENOUGH = 2  # values that a standard deviation needs
 RESAMPLES = 2000
 SEED = 0
 FEWEST = 4  # values of a sample that is worth resampling
-SMALLEST_EIGENVALUE = 1e-9  # of the correlation matrix: below it, one position follows from the others
 Places = NDArray[np.int64]
 SHARE = (
     facts.Datum("share", "share", facts.Form.SHARE, "inside / of", 1),
@@ -290,107 +288,7 @@ AREA = facts.Metric(
 )
 
 
-class Hotelling(NamedTuple):
-    """T2, and the F distribution of its test: `F` has `dof_1`, `dof_2` degrees of freedom."""
-
-    T2: float
-    F: float
-    dof_1: float
-    dof_2: float
-    critical: float  # at the level 5 %
-    p_value: float
-
-
-def hotelling(repeats: facts.Floats, members: facts.Floats) -> Hotelling | None:
-    """Compare the means of repeats (n, p) and members (N, p), n > p; None where degrees of freedom do not suffice."""
-    n, p = repeats.shape
-    difference = repeats.mean(axis=0) - members.mean(axis=0)
-    of_repeats, of_members = _covariance_of_mean(repeats), _covariance_of_mean(members)
-    both = of_repeats + of_members
-    squared = float(difference @ np.linalg.solve(both, difference))
-    inverse = _spread(both, of_repeats) / (n - 1)
-    if len(members) > 1:
-        inverse += _spread(both, of_members) / (len(members) - 1)
-    degrees = (p + p * p) / inverse
-    rest = degrees - p + 1
-    if rest <= 0.0:
-        return None
-    scale = degrees * p / rest
-    special = load_module("scipy.special", "judging a sweep")
-    critical = scale * float(special.fdtri(p, rest, compare.CONFIDENCE))
-    return Hotelling(squared, squared / scale, float(p), rest, critical, float(special.fdtrc(p, rest, squared / scale)))
-
-
-def _covariance_of_mean(sample: facts.Floats) -> facts.Floats:
-    """Return the sample covariance of p columns by the number of rows; zero for a single row."""
-    n, p = sample.shape
-    covariance: facts.Floats = np.zeros((p, p)) if n == 1 else np.cov(sample, rowvar=False).reshape(p, p) / n
-    return covariance
-
-
-def _spread(both: facts.Floats, part: facts.Floats) -> float:
-    """Return tr(M^2) + tr(M)^2 for M = part both^-1, which has the traces of both^-1 part."""
-    share = np.linalg.solve(both, part)
-    return float(np.trace(share @ share) + np.trace(share) ** 2)
-
-
-def _find_joint(evidence: facts.Evidence) -> facts.Findings:
-    lengths = evidence.lengths
-    chosen = [pair for pair in lengths if pair.scatters]
-    messages = [f"{pair.name}: repeats without scatter are left out" for pair in lengths if not pair.scatters]
-    if not chosen:
-        return facts.Findings((), (*messages, "not computed: no measured position scatters"))
-    repeats, incomplete = facts.complete_repeats(chosen)
-    members = np.column_stack([pair.simulated for pair in chosen])
-    members = members[np.isfinite(members).all(axis=1)]
-    if incomplete:
-        messages.append(f"left out, as not all positions were measured: replicate {incomplete}")
-    complaint = _complaint_joint(repeats, members)
-    found = None if complaint else hotelling(repeats, members)
-    if found is None:
-        return facts.Findings((), (*messages, f"not computed: {complaint or 'too few samples for their scatter'}"))
-    positions = ", ".join(f"{pair.measured.block} {pair.measured.quantity}" for pair in chosen)
-    row: facts.Row = {"positions": positions, "repeats": len(repeats), "members": len(members)}
-    return facts.Findings(({**row, **found._asdict(), "within": found.critical >= found.T2},), tuple(messages))
-
-
-def _complaint_joint(repeats: facts.Floats, members: facts.Floats) -> str:
-    """Return why no test is possible, or nothing."""
-    n, p = repeats.shape
-    if n <= p:
-        return f"{n} complete repeats for {p} positions, at least {p + 1} are needed"
-    if not len(members):
-        return "no sample has all positions"
-    if not np.ptp(repeats, axis=0).all():
-        return "a position does not scatter in the complete repeats"
-    correlation = np.atleast_2d(np.corrcoef(repeats, rowvar=False))
-    if np.linalg.eigvalsh(correlation)[0] < SMALLEST_EIGENVALUE:
-        return "a position follows from the others (their covariance is singular)"
-    return ""
-
-
-JOINT = facts.Metric(
-    "joint",
-    "do the means of all positions agree? Hotelling's T2, two samples",
-    (
-        facts.Datum("positions", "positions", facts.Form.TEXT, "blocks and quantities taken together"),
-        facts.Datum("repeats", "n", facts.Form.COUNT, "repeats in which all of them were measured"),
-        facts.Datum("members", "N", facts.Form.COUNT, "samples that have all of them"),
-        facts.Datum("T2", "T2", facts.Form.NUMBER, "squared distance of the means in units of their scatter"),
-        facts.Datum("critical", "5 %", facts.Form.NUMBER, "T2 that is exceeded by chance in 5 % of experiments"),
-        facts.Datum("F", "", facts.Form.NUMBER, "T2 scaled to follow the F distribution"),
-        facts.Datum("dof_1", "", facts.Form.NUMBER, "its degrees of freedom: number of positions"),
-        facts.Datum("dof_2", "dof", facts.Form.NUMBER, "its degrees of freedom: n - p for large ensembles", 1),
-        facts.Datum("p_value", "p", facts.Form.NUMBER, "probability of such a T2 if the true means agree", 3),
-        facts.Datum("within", "agree", facts.Form.TEXT, "T2 <= critical T2"),
-    ),
-    _find_joint,
-)
-
-
-METRICS: dict[str, facts.Metric] = {
-    metric.name: metric for metric in (INSIDE, OUTCOME, VALIDATION, PREDICTION, AREA, JOINT)
-}
+METRICS: dict[str, facts.Metric] = {metric.name: metric for metric in (INSIDE, OUTCOME, VALIDATION, PREDICTION, AREA)}
 
 
 @dataclass(frozen=True)

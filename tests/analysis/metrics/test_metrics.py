@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from scipy import stats
 
 from blocksim.analysis.evidence import Findings
-from blocksim.analysis.metrics import Hotelling, area_between, area_interval, hotelling, outcome, repeat_passes_all
+from blocksim.analysis.metrics import area_between, area_interval, outcome, repeat_passes_all
 from tests.analysis.metrics.conftest import Key, found_by
 from tests.golden import Golden
 
@@ -77,42 +77,3 @@ def test_members_that_do_not_scatter_leave_the_scatter_of_the_repeats() -> None:
     # the area is 5 minus the mean of the repeats: between 5 - 3 and 5 - 0 for any resample
     assert 2.0 <= low < 3.5 < high <= 5.0
     assert np.isnan(area_interval(np.arange(3.0), np.arange(6.0))).all()
-
-
-CROSS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-
-
-def hotelling_of(repeats: object, members: object) -> Hotelling:
-    found = hotelling(np.asarray(repeats, dtype=float), np.asarray(members, dtype=float))
-    assert found is not None
-    return found
-
-
-def test_one_member_is_the_one_sample_test_by_hand() -> None:
-    # n = 4, p = 2, covariance diag(2/3): T2 = 4 (1 + 1) 3/2 = 12; F = T2 (n - p)/(p (n - 1)) = 4 with 2 and 2 degrees,
-    # where P(F > f) = 1/(1 + f) = 0.2 and F is above 19 in 5 %: T2 above 19 * 3 = 57
-    found = hotelling_of(CROSS, [[1.0, 1.0]])
-    assert found == pytest.approx((12.0, 4.0, 2.0, 2.0, 57.0, 0.2), abs=1e-9)
-
-
-def test_one_position_is_welch_s_test() -> None:
-    random = np.random.default_rng(5)
-    repeats, members = random.normal(0.0, 1.0, 6), random.normal(1.0, 4.0, 9)
-    found, expected = (
-        hotelling_of(repeats[:, None], members[:, None]),
-        stats.ttest_ind(repeats, members, equal_var=False),
-    )
-    assert pytest.approx(expected.statistic**2, abs=1e-9) == found.T2
-    assert found.dof_2 == pytest.approx(expected.df, abs=1e-9)
-    assert found.p_value == pytest.approx(expected.pvalue, abs=1e-9)
-
-
-@pytest.mark.parametrize(("members", "scatter"), [(10, 1.0), (10, 5.0), (100, 0.3)])
-def test_equal_means_are_refused_in_5_percent_of_experiments(members: int, scatter: float) -> None:
-    random, trials = np.random.default_rng(members), 1_000
-    shape = np.array([[1.0, 0.8], [0.0, 0.6]])  # correlated repeats
-    refused = sum(
-        hotelling_of(random.normal(size=(6, 2)) @ shape, scatter * random.normal(size=(members, 2))).p_value < 0.05
-        for _ in range(trials)
-    )
-    assert refused / trials == pytest.approx(0.05, abs=0.02)  # the distribution of F is an approximation
