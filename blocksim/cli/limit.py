@@ -1,16 +1,12 @@
 """blocksim limit and fragility: where a structure stands and falls over a key, and how probably over an intensity."""
 
-import re
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.options import Option
-from blocksim.scenario.models.timeline import SPRINGS
 from blocksim.simulation.schemes import kernels_of
 from blocksim.study import answer, criterion, fragility, limit, limit_answer, limit_plan, rows
 from blocksim.study.plan import estimate_of
@@ -32,7 +28,6 @@ def limit_command(
     options: limit_plan.LimitOptions,
     *,
     over: limit_plan.OtherKey = None,
-    both_laws: Annotated[bool, Option("Search with springs and with rigid contacts, and compare.")] = False,
     static: Annotated[
         bool, Option("By statics alone, without a run: a bound beyond which no equilibrium exists.")
     ] = False,
@@ -51,22 +46,18 @@ def limit_command(
     """
     document = source.document()
     if dry_run:
-        if over is not None or both_laws or static:
-            raise typer.BadParameter("an estimate is of one search; leave --over, --both-laws and --static out")
+        if over is not None or static:
+            raise typer.BadParameter("an estimate is of one search; leave --over and --static out")
         cases = limit_plan.read_limit(document, options).cases_of_one_change()
         return prepare.estimate_report(estimate_of(cases), options.jobs, screen, [ONE_CHANGE])
     if static:
-        if both_laws or over is not None:
-            raise typer.BadParameter("statics has one key and no law; leave --both-laws and --over out")
+        if over is not None:
+            raise typer.BadParameter("statics has one key; leave --over out")
         from blocksim.study import static_limit
 
         bound = static_limit.find_static(limit_plan.read_limit(document, options), options)
         return command_line.report_of([bound], {"folder": str(bound.folder), **bound.to_dict()})
     if over is not None:
-        if both_laws:
-            raise typer.BadParameter(
-                "a curve of limits is searched with one law; leave --both-laws out", param_hint=limit_plan.OVER
-            )
         of_curve = limit_plan.CurveOptions(**options.search_options, over=over)
         curve = limit_plan.read_curve(document, of_curve)
         _warn(next(iter(curve.searches.values())), screen)
@@ -78,39 +69,25 @@ def limit_command(
         with progress.exit_on_stop():
             points = limit.find_curve(curve, of_curve, tell_limit)
         return command_line.report_of([points], {"folder": str(points.folder), **points.to_dict()})
-    documents = limit_plan.variants(document, both_laws=both_laws)
-    plans = {name: limit_plan.read_limit(one, options) for name, one in documents.items()}
+    plan = limit_plan.read_limit(document, options)
     if options.stiffer:
-        limit.refuse_without_springs(*plans.values())
-    _warn(next(iter(plans.values())), screen)
-    found = {}
-    for name, plan in plans.items():
-        prepare.announce_compilation(kernels_of(plan.scenario_at(plan.span.low)), quiet=screen.silent)
+        limit.refuse_without_springs(plan)
+    _warn(plan, screen)
 
-        def tell_run(
-            value: float, verdict: criterion.Stability, row: rows.Row, plan: limit_plan.LimitPlan = plan
-        ) -> None:
-            screen.note(f"{answer.with_unit(value, plan.unit)}: {verdict.value} ({row['reason']})")
+    def tell_run(value: float, verdict: criterion.Stability, row: rows.Row) -> None:
+        screen.note(f"{answer.with_unit(value, plan.unit)}: {verdict.value} ({row['reason']})")
 
-        def tell_search(plan: limit_plan.LimitPlan) -> None:
-            scale, step = (plan.apart.get(key) for key in (limit.STIFFNESS, limit_answer.STEP))
-            if scale is not None:
-                changed = f"springs shift this limit, or may: once more with {limit.STIFFNESS} = {scale:g}"
-            else:
-                changed = f"both sides once more with half the time step, {limit_answer.STEP} = {step:.3g} s"
-            screen.note(changed)
+    def tell_search(other: limit_plan.LimitPlan) -> None:
+        scale, step = (other.apart.get(key) for key in (limit.STIFFNESS, limit_answer.STEP))
+        if scale is not None:
+            changed = f"springs shift this limit, or may: once more with {limit.STIFFNESS} = {scale:g}"
+        else:
+            changed = f"both sides once more with half the time step, {limit_answer.STEP} = {step:.3g} s"
+        screen.note(changed)
 
-        out, stiffer = options.out, options.stiffer
-        if out is not None and len(plans) > 1:
-            out = Path(out) / re.sub(r"[^a-z0-9.]+", "-", name)  # needs no quotes in a shell
-        if stiffer and name != limit_plan.NAMES[SPRINGS]:
-            stiffer = None
-        of_plan = replace(options, out=out, stiffer=stiffer, keep_runs=not no_runs, on_run=tell_run)
-        with progress.exit_on_stop():
-            found[name] = limit.find_limit(plan, of_plan, on_other=tell_search)
-    searches = [{"contacts": name, "folder": str(one.folder), **one.to_dict()} for name, one in found.items()]
-    report = command_line.report_of(list(found.values()), searches)
-    return replace(report, lines=[*report.lines, *_comparison(*found.values())]) if len(found) == 2 else report
+    with progress.exit_on_stop():
+        found = limit.find_limit(plan, replace(options, keep_runs=not no_runs, on_run=tell_run), on_other=tell_search)
+    return command_line.report_of([found], {"folder": str(found.folder), **found.to_dict()})
 
 
 def _warn(plan: limit_plan.LimitPlan, screen: command_line.Screen) -> None:
@@ -123,17 +100,6 @@ def _warn(plan: limit_plan.LimitPlan, screen: command_line.Screen) -> None:
     screen.note(f"forecast: {runs}; up to {seconds} each on one core")
     if not any(one.start.settle for one in ends) and all(map(limit_plan.is_sustained, ends)):
         screen.note(AT_ONCE)
-
-
-def _comparison(one: limit_answer.LimitAnswer, other: limit_answer.LimitAnswer) -> Iterator[str]:
-    """Yield how far the limits of two laws lie apart, where they have as many."""
-    first, second = limit_plan.NAMES[one.scheme], limit_plan.NAMES[other.scheme]
-    if len(one.limits) != len(other.limits):
-        yield f"\n{first} has {len(one.limits)} limits, {second} {len(other.limits)}"
-        return
-    for mine, its in zip(one.limits, other.limits, strict=True):
-        middle, theirs = 0.5 * (mine.low + mine.high), 0.5 * (its.low + its.high)
-        yield f"\n{second} against {first}: {(theirs - middle) / abs(middle):+.2%} (middles of the brackets)"
 
 
 def fragility_command(

@@ -475,23 +475,3 @@ def takes_whole(document: Document, key: str) -> bool:
     field = overrides.field_of(key, document.build())
     kinds = () if field is None else overrides.options(field.annotation)
     return int in kinds and float not in kinds
-
-
-def variants(document: Document, *, both_laws: bool = False) -> dict[str, Document]:
-    """Return the scenarios whose limits are compared, by what distinguishes them: both laws, or the present one."""
-    if both_laws:
-        return {time.contacts: with_scheme(document, name) for name, time in timeline.SCHEMES.items()}
-    return {document.build().time.contacts: document}
-
-
-def with_scheme(document: Document, scheme: str) -> Document:
-    """Return the document with a stepping scheme; of [time], what the present one alone knows is left out.
-
-    So is the step, where the scheme is another one: its scale is that of the scheme.
-    """
-    table = document.data.get("time")
-    present = dict(table) if isinstance(table, Mapping) else {}
-    others = set() if present.get("scheme", timeline.SPRINGS) == scheme else {"step", "force_step"}
-    known = set(timeline.SCHEMES[scheme].model_fields) - others
-    kept = {key: value for key, value in present.items() if key in known}
-    return replace(document, data={**document.data, "time": {**kept, "scheme": scheme}})

@@ -1,18 +1,26 @@
 """Limits of the literature, in both schemes: Goodman & Bray's slope, and diamonds of half-overlapped rows."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from blocksim.scenario import Document
+from blocksim.scenario.models import timeline
 from blocksim.study.limit import STIFFNESS, limit
-from blocksim.study.limit_plan import with_scheme
 from blocksim.study.run import run
 from tests.study.conftest import SCENARIOS
 
 SLOPE, WALL = SCENARIOS / "toppling_slope.toml", SCENARIOS / "tilting_wall.toml"
 FRICTION = "friction.block_block"
 GRAVITY = 9.81
+
+
+def with_scheme(document: Document, scheme: str) -> Document:
+    """Return a document with a stepping scheme, without what of [time] another one alone knows."""
+    known = set(timeline.SCHEMES[scheme].model_fields) - {"step", "force_step"}
+    kept = {key: value for key, value in document.data["time"].items() if key in known}
+    return replace(document, data={**document.data, "time": {**kept, "scheme": scheme}})
 
 
 # kN/m: normal forces of columns 13 on 12, 12 on 11, ... 2 on 1 at 38.15 degrees; columns 1 to 3 slide, others topple
