@@ -1,7 +1,6 @@
 """Result folders and files: written whole or not at all, their names, which of them blocksim wrote, who may write."""
 
 import contextlib
-import csv
 import errno
 import fcntl
 import hashlib
@@ -13,9 +12,7 @@ import stat
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import BinaryIO, Self
-
-from pydantic import BaseModel
+from typing import BinaryIO
 
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario, input_files, resolution, scenario_to_toml
@@ -145,8 +142,7 @@ SUMMARY = "run.json"
 DONE = "done.json"  # written last: the folder of a run without it is not finished
 CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run continues, removed when it has finished
 OURS = (SCENARIO, EXPERIMENT, MOTION, *BODY_MOTIONS, FINAL, SOILS, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
-HEAD_BYTES = 4096
-LONGEST_HEADER = 100_000  # bytes
+HEAD_BYTES = 1 << 16  # the heads of tables of many varied keys, too
 MOST_BYTES = 10 * input_files.MEGABYTE  # of a scenario or a summary
 TABLE_BYTES = input_files.MEGABYTE  # of a table of an experiment, which is not read if larger
 RESOLVED = resolution.MARK.encode()
@@ -167,41 +163,6 @@ def append_only_kind(start: bytes) -> Kind:
 def prefix_kind(form: bytes) -> Kind:
     """Return the kind of a CSV file whose first line has this form (a regular expression)."""
     return lambda head: re.fullmatch(form, head.split(b"\n", 1)[0].rstrip(b"\r")) is not None
-
-
-class TableRecord(BaseModel, frozen=True):
-    """What the summary of a study says of a table that was written."""
-
-    header: str  # empty where it is longer than a summary can hold
-    sha256: str
-
-    @classmethod
-    def of(cls, path: Path) -> Self:
-        """Return that of a table, which may still have another name. Raises OSError."""
-        with path.open("rb") as file:
-            line = file.readline(LONGEST_HEADER).rstrip(b"\r\n")
-        header = "" if len(line) >= LONGEST_HEADER else line.decode(errors="replace")
-        return cls(header=header, sha256=sha256_of(path))
-
-
-def is_own(path: Path, records: Iterable[TableRecord]) -> bool:
-    """Return True for a table as it was written, by its whole header and its checksum, or one that holds nothing.
-
-    `records` are of what was written last, and before: they are noted first, and a kill may come between.
-    """
-    return _is_of_kind(path, lambda _: TableRecord.of(path) in records)
-
-
-def extra_columns(path: Path, records: Iterable[TableRecord]) -> list[str] | None:
-    """Return the columns that a table has beyond those that were written, where these are known.
-
-    None where some of those are not there: it is another table.
-    """
-    present, *written = (next(csv.reader([one.header]), []) for one in (TableRecord.of(path), *records))
-    known = [columns for columns in written if set(columns) <= set(present)]
-    if not known:
-        return None
-    return [name for name in present if name not in known[-1]] if known[-1] else []
 
 
 def has_keys(*names: str) -> Kind:

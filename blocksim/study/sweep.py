@@ -200,9 +200,7 @@ class SweepRun:
         """Write the table; the more rows, the longer the while until it is worth it again."""
         began = time.monotonic()
         self.next_at = began + SOONEST
-        sweep_folder.write_table(
-            self.table, self.kind, manifest.table_rows(self.cases, self.done, self.ranges, self.shard)
-        )
+        sweep_folder.write_table(self.table, manifest.table_rows(self.cases, self.done, self.ranges, self.shard))
         ended = time.monotonic()
         self.next_at = ended + max(SOONEST, (ended - began) / SHARE)
 
@@ -259,9 +257,7 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> manifest.SweepR
         if of > 1 and len(missing) > MOST_SHARDS:
             lines.append(f"  and {len(missing) - MOST_SHARDS} more shards")
         raise errors.InvalidInputError("\n".join(lines))
-    sweep_folder.write_table(
-        folder / rows.TABLE, sweep_folder.SWEEP, manifest.table_rows(cases, done, rows.Ranges.of(base))
-    )
+    sweep_folder.write_table(folder / rows.TABLE, manifest.table_rows(cases, done, rows.Ranges.of(base)))
     return manifest.SweepResult(folder, planned=len(cases))
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ValidationError
 
-from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
-from blocksim.scenario import Document, Scenario, input_files, overrides, spelling
+from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError
+from blocksim.scenario import Document, Scenario, input_files, overrides
 from blocksim.scenario.models.motion import content_of
 from blocksim.simulation import files, provenance
 from blocksim.study.plan import with_tables
@@ -35,7 +35,7 @@ class FolderKind:
         self.plan, self.origin = f"{name}.toml", f"{name}.json"
         self.head = f"# {name.capitalize()} ".encode()  # of the plan, a resolved scenario that is written first
         names = "|".join(tables)
-        self.tables = re.compile(names)  # their checksums are kept; the other results grow by lines
+        self.tables = re.compile(names)
         self.leftover = re.compile(rf"\.({names}|{name}\.json|{name}\.toml)\..*")  # of a writer that was killed
         self.results = {
             **{table: files.prefix_kind(form.encode()) for table, form in tables.items()},
@@ -44,20 +44,8 @@ class FolderKind:
             rf"{name}\.json": files.has_keys("began_at"),
         }
 
-    def records_of(self, path: Path) -> tuple[files.TableRecord, ...] | None:
-        """Return what the summary says of a table; None for anything else, and where the study is older than that."""
-        if not self.tables.fullmatch(path.name) or not path.is_file() or path.is_symlink():
-            return None
-        try:
-            origin = read_origin(path.parent, self)
-        except BlocksimError:
-            return None
-        return None if origin is None or origin.tables is None else origin.tables.get(path.name, ())
-
     def is_ours(self, path: Path) -> bool:
         """Return True for a file that a study has written, or left half written when it was killed."""
-        if (records := self.records_of(path)) is not None:
-            return files.is_own(path, records)
         for pattern, kind in self.results.items():
             if re.fullmatch(pattern, path.name):
                 return files.is_written(path, {path.name: kind}, self.plan)
@@ -79,7 +67,6 @@ class StudyOrigin(BaseModel, frozen=True):
     seed: int | None = None
     environment: dict[str, str]
     sha256: dict[str, str] = {}  # of the copies of tables, as they were written
-    tables: dict[str, tuple[files.TableRecord, ...]] | None = None  # last two of each result; None in older versions
 
 
 def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: FolderKind = SWEEP) -> None:
@@ -101,7 +88,6 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: F
                 mode=None if plan is None else plan.mode,
                 seed=plan.seed if plan is not None and plan.is_sampled else None,
                 environment=provenance.environment(),
-                tables={},
             )
             text = origin.model_copy(update={"sha256": sums}).model_dump_json(indent=2)
             files.write_text(folder / kind.origin, text + "\n")
@@ -137,10 +123,13 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
                     how = "wait for it, or write elsewhere with --out DIR"
                     raise OutputExistsError(f"{folder}: {kind.what} is running here; {how}")
     files.refuse_foreign_copies(tables, folder, kind.plan)
-    changed = _refuse_foreign(present, kind, overwrite=overwrite)
+    results = (path for path in present if any(re.fullmatch(pattern, path.name) for pattern in kind.results))
+    if (foreign := next((path for path in results if not kind.is_ours(path)), None)) is not None:
+        raise OutputExistsError(f"{foreign}: not a result of {kind.what}; move it away, or choose another --out DIR")
     if overwrite:  # whatever else lies there stays
-        for path in {*changed, *(one for one in folder.iterdir() if one.name != kind.plan and kind.is_ours(one))}:
-            path.unlink()
+        for path in folder.iterdir():
+            if path.name != kind.plan and kind.is_ours(path):
+                path.unlink()
         cases = folder / CASES
         if cases.is_dir() and not cases.is_symlink():
             for case in cases.iterdir():
@@ -149,60 +138,17 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
                 cases.rmdir()
 
 
-def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: bool = False) -> list[Path]:
-    """Raise OutputExistsError where a file of somebody else has the name of a result, or somebody has changed one.
-
-    With `overwrite` a table may be replaced to which a person has added something; returns those, and tells what goes.
-    """
-    whose = kind.what.replace("a ", "the ", 1)
-    results = [path for path in present if any(re.fullmatch(pattern, path.name) for pattern in kind.results)]
-    changed = [path for path in results if not kind.is_ours(path)]
-    told = []
-    for path in changed:
-        added = files.extra_columns(path, kind.records_of(path) or ())  # None: it is no table of the study any more
-        shown = spelling.list_names([repr(name[:LONGEST_NAME]) for name in added or ()], MOST_SHOWN)
-        which = f" (columns added: {shown})" if added else ""
-        text = f"{path}: changed since {whose} wrote it{which}; "
-        if not overwrite or added is None:
-            again = "" if added is None else "--overwrite replaces it, or "
-            raise OutputExistsError(f"{text}{again}move it away, or write elsewhere with --out DIR")
-        told.append(f"{text}it is replaced")
-    for text in told:
-        log.warning("%s", text)
-    return changed
-
-
-def note_table(path: Path, written: Path, kind: FolderKind) -> None:
-    """Note in the summary of a study what a table is about to hold, `written` beside it, and what it holds until then.
-
-    Shards have one summary in common, so nobody else writes it meanwhile. Raises OutputError, and OutputExistsError
-    where somebody has changed the table since it was written.
-    """
-    with files.brief_lock(path.parent):
-        origin = read_origin(path.parent, kind)
-        if origin is None:
-            return
-        is_there = path.exists() or path.is_symlink()
-        _refuse_foreign([path] if is_there else [], kind)
-        holds = tuple(files.TableRecord.of(one) for one in ([path, written] if is_there else [written]))
-        noted = origin.model_copy(update={"tables": {**(origin.tables or {}), path.name: holds}})
-        kept = json.loads(input_files.read_limited(path.parent / kind.origin, input_files.MEGABYTE))
-        data = {**kept, "tables": noted.model_dump(mode="json")["tables"]}
-        files.write_text(path.parent / kind.origin, json.dumps(data, indent=2) + "\n")
-
-
-def write_table(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]]) -> None:
-    """Write a table of a study, heads first, one row after the other. Raises as `note_table`."""
+def write_table(path: Path, rows: Iterable[Sequence[object]]) -> None:
+    """Write a table of a study, heads first, one row after the other. Raises OutputError."""
     with files.atomic_path(path) as temporary:
         with temporary.open("w", encoding="utf-8", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows(rows)
         files.sync_file(temporary)
-        note_table(path, temporary, kind)
 
 
 def write_answer(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]], answer: Mapping[str, object]) -> None:
     """Write the table of a study (heads first), and its answer into the summary. Raises OutputError."""
-    write_table(path, kind, rows)
+    write_table(path, rows)
     origin = read_origin(path.parent, kind)
     begun = {} if origin is None else origin.model_dump(mode="json", exclude_none=True)
     files.write_text(path.parent / kind.origin, json.dumps({**begun, **answer}, indent=2) + "\n")

@@ -1,14 +1,9 @@
 """A sweep keeps one row per case, repeats nothing, and continues where a case fails."""
 
-import json
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from threading import Event, Semaphore
-from typing import Any
 
 import pandas as pd
 import pytest
@@ -17,15 +12,14 @@ from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsEr
 from blocksim.scenario import Document, load_scenario
 from blocksim.simulation.files import is_resolved
 from blocksim.simulation.observables import table_columns
-from blocksim.study.fragility import fragility, read_fragility
-from blocksim.study.limit import limit, limit_curve
+from blocksim.study.fragility import read_fragility
 from blocksim.study.manifest import Entry, Manifest, Shard, read_sweep
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.run import run
 from blocksim.study.sweep import merge, sweep
-from blocksim.study.sweep_folder import SWEEP, note_table, prepare
+from blocksim.study.sweep_folder import prepare
 from tests.study.conftest import SCENARIOS
-from tests.study.plans import KINETIC, MU, SCATTER, SLIDES, SLOPE, TILT, TILTS, block_on_a_slope
+from tests.study.plans import KINETIC, block_on_a_slope
 
 END = "time.end"
 OVERLAP = "contact.max_overlap"
@@ -205,74 +199,6 @@ def test_a_file_of_a_person_in_the_place_of_a_result_stays(quick: Document, tmp_
         with pytest.raises(OutputExistsError, match="not a sweep" if name == "sweep.toml" else name):
             prepare(tmp_path, base, "0123", overwrite=overwrite)
         assert content(tmp_path) == before
-
-
-FEW: dict[str, Any] = {TILT: {"from": "5 deg", "to": "40 deg", "count": 2}}
-STUDIES: dict[str, Callable[..., object]] = {
-    "sweep.csv": partial(sweep, SLOPE, {MU: [0.3, 0.4]}),
-    "limit.csv": partial(limit, SLOPE, FEW, tolerance=0.9, keep_runs=False),
-    "limits.csv": partial(limit_curve, SLOPE, FEW, {MU: [0.3, 0.4]}, tolerance=0.9),
-    "fragility.csv": partial(fragility, SLOPE, TILTS, SCATTER, members=1, fails=SLIDES),
-    "members.csv": partial(fragility, SLOPE, TILTS, SCATTER, members=1, fails=SLIDES),
-}
-
-
-@pytest.mark.parametrize("name", STUDIES)
-def test_what_a_person_adds_to_a_table_goes_only_when_asked_for_and_is_told(
-    tmp_path: Path, name: str, caplog: pytest.LogCaptureFixture
-) -> None:
-    study, table = STUDIES[name], tmp_path / "out" / name
-    study(out=table.parent)
-    written = table.read_text()
-    study(out=table.parent)  # as it was written it is replaced
-    head, *rows = written.splitlines()
-    edits = {
-        "changed since .* (columns added: 'notes')": "\n".join([f"{head},notes", *(f"{row},odd" for row in rows), ""]),
-        "changed since .* wrote it; --overwrite": f"{written[:-1]}0\n",
-    }
-    for told, edited in edits.items():
-        table.write_text(edited)
-        with pytest.raises(OutputExistsError, match=told.replace("(", r"\(").replace(")", r"\)")):
-            study(out=table.parent)
-        assert table.read_text() == edited
-    table.write_text(next(iter(edits.values())))
-    study(out=table.parent, overwrite=True)
-    assert f"{name}: changed since " in caplog.text
-    assert "(columns added: 'notes'); it is replaced" in caplog.text
-    assert table.read_text() == written
-
-
-def test_a_table_is_known_after_kills_while_it_is_replaced_and_by_its_heads_in_folders_of_older_versions(
-    tmp_path: Path,
-) -> None:
-    study, table, summary = STUDIES["sweep.csv"], tmp_path / "out" / "sweep.csv", tmp_path / "out" / "sweep.json"
-    study(out=table.parent)
-    written = table.read_bytes()
-    for number in range(3):  # each time killed after the note, before the new table took the place of the old one
-        (tmp_path / "new.csv").write_text(f"case,status\n{number},finished\n")
-        note_table(table, tmp_path / "new.csv", SWEEP)
-    study(out=table.parent)
-    older = json.loads(summary.read_text())
-    assert len(older.pop("tables")["sweep.csv"]) == 2
-    for text in (written.decode(), "case,remark\n"):
-        summary.write_text(json.dumps(older))
-        table.write_text(text)
-        with nullcontext() if text.encode() == written else pytest.raises(OutputExistsError, match=r"sweep\.csv"):
-            study(out=table.parent)
-
-
-def test_a_table_that_a_person_changes_while_the_sweep_runs_stays(quick: Document, tmp_path: Path) -> None:
-    table = tmp_path / "sweep.csv"
-
-    def edit(*_: object) -> None:
-        table.write_text("case,status,notes\n")
-
-    with pytest.raises(OutputExistsError, match=r"sweep\.csv: changed since the sweep wrote it"):
-        sweep(quick, TWO, out=tmp_path, on_row=edit)
-    assert table.read_text() == "case,status,notes\n"
-    assert len(lines(tmp_path)) == 2  # nothing is lost
-    table.unlink()
-    assert len(sweep(quick, TWO, out=tmp_path).table) == 2
 
 
 def test_who_begins_a_sweep_waits_while_another_one_makes_room_for_it(
