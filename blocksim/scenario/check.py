@@ -9,7 +9,7 @@ from typing import get_args
 
 from pydantic import ValidationError
 
-from blocksim.scenario import after_end, geometry, mistakes, overlap, overrides, placement, start, support, units
+from blocksim.scenario import after_end, geometry, mistakes, overlap, overrides, placement, start, units
 from blocksim.scenario.models import base, contact, study, timeline
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.structures import polygons
@@ -171,7 +171,7 @@ def implausible_values(scenario: Scenario, placed: Sequence[placement.PlacedBody
                     f"{overrides.format_key(('soils', soil.name, 'spacing'))} = {1e3 * soil.spacing:.4g} mm fills "
                     f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
                 )
-    loose = support.support_warning(scenario, placed)
+    loose = overlap.support_warning(scenario, placed)
     return [*warnings, *after_end.cut_off(scenario), *([loose] if loose else [])]
 
 

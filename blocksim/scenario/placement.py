@@ -130,12 +130,6 @@ def place_bodies(scenario: Scenario) -> tuple[PlacedBody, ...]:
     return placement_of(scenario).bodies
 
 
-def has_outlines(scenario: Scenario) -> bool:
-    """Return True if any block is no rectangle, without placing them."""
-    shaped = any(isinstance(structure, PolygonStructure) for structure in scenario.structures)
-    return shaped or any(block.polygon for block in scenario.blocks.values())
-
-
 def outlines_of(placed: Sequence[PlacedBody]) -> NDArray[np.float64] | None:
     """Return the corners (m, (b, k, 2)) of blocks, the last one repeated; None where all are rectangles."""
     if not any(body.outline for body in placed):

@@ -23,7 +23,7 @@ from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.options import Option, Overwrite, silent, takes
-from blocksim.scenario import Document, Scenario, overrides, place_bodies, scenario_hash, support, units
+from blocksim.scenario import Document, Scenario, overlap, overrides, place_bodies, scenario_hash, units
 from blocksim.scenario.models import study, timeline
 from blocksim.scenario.models.loads import stretches_of
 from blocksim.scenario.placement import smallest_width
@@ -299,7 +299,7 @@ def is_sustained(scenario: Scenario) -> bool:
     if why_not_sustained(scenario):
         return False
     placed = place_bodies(scenario)
-    dropped, _ = support.unsupported(scenario, placed, NEAR * smallest_width(placed))
+    dropped, _ = overlap.unsupported(scenario, placed, NEAR * smallest_width(placed))
     return not dropped
 
 

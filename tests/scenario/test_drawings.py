@@ -15,8 +15,7 @@ from blocksim.errors import InvalidInputError, ScenarioError, UnavailableError
 from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_hash, scenario_to_toml
 from blocksim.scenario.check import implausible_values
 from blocksim.scenario.document import Document
-from blocksim.scenario.structures.drawings import DrawingError, simplify
-from blocksim.scenario.structures.polygons import read_drawing
+from blocksim.scenario.structures.drawings import DrawingError, read_drawing, simplify
 from tests.golden import Golden
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]

@@ -8,7 +8,7 @@ import pytest
 from blocksim.scenario import place_bodies, scenario_from_mapping
 from blocksim.scenario.check import implausible_values
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.support import support_warning, unsupported
+from blocksim.scenario.overlap import support_warning, unsupported
 
 GAP = 0.010
 

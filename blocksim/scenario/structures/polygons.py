@@ -6,54 +6,18 @@ from typing import Literal, Self
 
 from pydantic import ModelWrapValidatorHandler, PrivateAttr, ValidationError, ValidationInfo, model_validator
 
-from blocksim.errors import BlocksimError
-from blocksim.extras import load_module
-from blocksim.scenario import geometry, input_files, units as q
+from blocksim.scenario import geometry, units as q
 from blocksim.scenario.models.base import Identifier, Table, setting, table_path
 from blocksim.scenario.models.geometry import COUNTS, Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure
 from blocksim.scenario.structures.drawings import (
+    MOST_OUTLINES,
     Drawing,
     DrawingError,
     DrawingOutline,
     place_text,
-    read_geojson,
-    simplify,
+    read_drawing,
 )
-from blocksim.scenario.structures.dxf import DXF, read_dxf
-
-MOST_BYTES = 20 * input_files.MEGABYTE
-MOST_OUTLINES, MOST_CORNERS = 2000, 16_000
-"""In a drawing; the scenario that is kept with the results has them all, and a scenario has a megabyte at most."""
-DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
-"""What readers raise for a file that is no drawing."""
-
-
-def read_drawing(path: Path) -> Drawing:
-    """Return the outlines in a drawing; points within straight edges are left out.
-
-    Raises DrawingError, and UnavailableError for DXF without its package.
-    """
-    is_dxf = path.suffix.lower() == f".{DXF}"
-    ezdxf = load_module("ezdxf", f"reading {path.name}", DXF) if is_dxf else None
-    damage = DAMAGE if ezdxf is None else (ezdxf.DXFError, *DAMAGE)
-    try:
-        content = input_files.read_limited(path, MOST_BYTES)  # no file that is larger, no pipe
-        found = read_geojson(content) if ezdxf is None else read_dxf(ezdxf.readfile(path))
-    except DrawingError:
-        raise
-    except BlocksimError as error:
-        raise DrawingError(str(error)) from None
-    except damage as error:
-        raise DrawingError(f"not a {'DXF' if is_dxf else 'GeoJSON'} file: {str(error)[:100]}") from None
-    outlines = found.outlines
-    if not outlines:
-        raise DrawingError("no closed polyline in it" if is_dxf else "no polygon in it")
-    if len(outlines) > MOST_OUTLINES or sum(len(one.outline) for one in outlines) > MOST_CORNERS:
-        most = f"at most {MOST_OUTLINES} with {MOST_CORNERS} corners are allowed"
-        raise DrawingError(f"{len(outlines)} outlines are too many; {most}")
-    return found._replace(outlines=[one._replace(outline=simplify(one.outline)) for one in outlines])
-
 
 AS_READ = "; results keep the blocks as they were read"
 MOST_SHRINK = 0.01  # of the least width of a block

@@ -22,8 +22,9 @@ from blocksim.errors import BlocksimError, InvalidInputError, OutputError
 from blocksim.kernels.common import arrays, compiler, jit, systems
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.options import silent
-from blocksim.scenario import Scenario, motion, overlap, placement, scenario_from_mapping
+from blocksim.scenario import Scenario, motion, overlap, scenario_from_mapping
 from blocksim.scenario.models.timeline import SCHEMES as TABLES
+from blocksim.scenario.structures.base import PolygonStructure
 from blocksim.simulation import trajectory
 from blocksim.world import build as scenes
 from blocksim.world.systems import others_of
@@ -342,7 +343,8 @@ def kernels_of(scenario: Scenario) -> str:
     """Return which set of kernels a scenario needs."""
     scheme = SCHEMES[scenario.time.scheme]
     kernels = scheme.kernels(scenario.contact.model)
-    if placement.has_outlines(scenario):
+    are_shaped = any(isinstance(structure, PolygonStructure) for structure in scenario.structures)
+    if are_shaped or any(block.polygon for block in scenario.blocks.values()):
         kernels = scheme.of_outlines.get(kernels, kernels)
     return scheme.kernel_variant(kernels, scenario)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
-from blocksim.scenario.structures.dxf import DXF, DXF_APPLICATION, DXF_INTEGER, DXF_TEXT
+from blocksim.scenario.structures.drawings import DXF, DXF_APPLICATION, DXF_INTEGER, DXF_TEXT
 from blocksim.simulation import files, instruments
 from blocksim.simulation.trajectory import BODIES, UNITS, Contacts, Frames, forces_on_a, join_contacts
 from blocksim.world.systems.blocks import BLOCKS, are_removed, distinct, placed_points, supports_track

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.scenario.geometry import regular
-from blocksim.scenario.structures.polygons import read_drawing
+from blocksim.scenario.structures.drawings import read_drawing
 from blocksim.simulation.files import refuse_foreign
 from blocksim.simulation.stores import exports
 from blocksim.simulation.stores.exports import (
