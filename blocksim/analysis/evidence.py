@@ -1,6 +1,6 @@
 """The members of an ensemble beside the repeats of an experiment, and what a metric of both is."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from blocksim.analysis import compare, experiment
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.spelling import list_names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -188,12 +187,3 @@ BLOCK = (
     Datum("quantity", "quantity", Form.TEXT, "measured quantity"),
     Datum("unit", "", Form.TEXT, "unit of the numbers: mm or deg"),
 )
-
-
-def complete_repeats(pairs: Sequence[SamplePair]) -> tuple[Floats, str]:
-    """Return the replicates in which all p pairs were measured, shape (n, p), and a list of the others."""
-    every = sorted({replicate for pair in pairs for replicate in pair.repeats})
-    complete = [replicate for replicate in every if all(replicate in pair.repeats for pair in pairs)]
-    rows = [[pair.repeats[replicate] for pair in pairs] for replicate in complete]
-    others = list_names(sorted(set(every) - set(complete)), experiment.MOST_NAMES)
-    return np.array(rows, dtype=float).reshape(len(rows), len(pairs)), others

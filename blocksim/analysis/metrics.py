@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.analysis import compare, evidence as facts
-from blocksim.analysis.experiment import ExperimentTable
+from blocksim.analysis.experiment import MOST_NAMES, ExperimentTable
 from blocksim.errors import InvalidInputError
 from blocksim.notebook import Shown
+from blocksim.scenario.spelling import list_names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,10 +56,11 @@ def _find_outcome(evidence: facts.Evidence) -> facts.Findings:
     if not blocks:
         return facts.Findings((), ("not computed: the sweep has no rotations",))
     rotations = np.column_stack([members.values(block, ROTATION) for block in blocks])
-    repeats, incomplete = facts.complete_repeats(measured)
+    every = sorted({replicate for pair in measured for replicate in pair.repeats})
+    complete = [replicate for replicate in every if all(replicate in pair.repeats for pair in measured)]
     ends = zip(rotations.tolist(), members.has_ended, strict=True)
     found = Counter(outcome(row) if has_ended else FAILED for row, has_ended in ends)
-    seen = Counter(map(outcome, repeats.tolist()))
+    seen = Counter(outcome([pair.repeats[replicate] for pair in measured]) for replicate in complete)
     rows: list[facts.Row] = []
     for name in sorted({*found, *seen}, key=lambda name: (-found[name], -seen[name], name)):
         row: facts.Row = {
@@ -73,7 +75,7 @@ def _find_outcome(evidence: facts.Evidence) -> facts.Findings:
             row |= {"measured": seen[name], "repeats": seen.total(), "lower_bound": bound}
         rows.append(row)
     messages = ["blocks: " + ", ".join(blocks)]
-    if incomplete:
+    if incomplete := list_names(sorted(set(every) - set(complete)), MOST_NAMES):
         messages.append(f"left out, as not all rotations were measured: replicate {incomplete}")
     if seen:
         messages.append("at least: one-sided 95 % limit of the measured share")

@@ -378,5 +378,5 @@ def _rules(pairs: Sequence[describe.PairDescription]) -> list[str]:
         for i, line in enumerate(textwrap.wrap(", ".join(found[key]), room))
     ]
     lines = output.table_lines(("set by", "for"), rows, left=2) if found else []
-    is_rigid = pairs[0].normal_damping_ratio is None
-    return [*lines, f"other values: defaults{'' if is_rigid else '; stiffness from E and ν of the materials'}"]
+    of_springs = "" if pairs[0].normal_damping_ratio is None else "; stiffness from E and ν of the materials"
+    return [*lines, f"other values: defaults{of_springs}"]

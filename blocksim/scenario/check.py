@@ -183,7 +183,8 @@ def _impacts(scenario: Scenario, placed: Sequence[placement.PlacedBody]) -> Iter
     """Yield that contact.impacts has no effect, or that blocks touch whose restitution asks for another value."""
     if not scenario.time.has_rigid_contacts:
         if scenario.contact.impacts == "sequential":
-            yield 'contact.impacts has no effect: contacts are springs; time.scheme = "nonsmooth" has rigid ones'
+            rigid = f"time.scheme = {units.toml(timeline.IMPULSES)} has rigid ones"
+            yield f"contact.impacts has no effect: contacts are springs; {rigid}"
         return
     pairs = [pair.restitution or 0.0 for row in scenario.pairs.values() for pair in row.values()]
     restitution = max(scenario.contact.restitution.block_block, *pairs, 0.0)

@@ -38,7 +38,7 @@ class MemberEnd:
     time_step: float  # s
     rows: instruments.FrameRows = field(repr=False)  # one: the last
     observables: dict[str, Value] = field(default_factory=dict)  # observables of rows, by name
-    convergence: Mapping[str, float] | None = None  # as results.Convergence, of rigid contacts
+    convergence: Mapping[str, float] | None = None  # as results.ImpulseConvergence, of rigid contacts
 
     @cached_property
     def frames(self) -> trajectory.Frames:

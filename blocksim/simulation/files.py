@@ -84,7 +84,7 @@ def _remove_leftovers(path: Path) -> None:
         leftovers = [entry.path for entry in entries if form.fullmatch(entry.name)]
     for leftover in leftovers:
         with contextlib.suppress(OSError):  # its writer lives, or it has gone
-            handle = os.open(leftover, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+            handle = os.open(leftover, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 os.unlink(leftover)  # noqa: PTH108 - a name from scandir
@@ -94,8 +94,6 @@ def _remove_leftovers(path: Path) -> None:
 
 def sync_file(path: Path) -> None:
     """Wait until what was written to a file is on the disk, where it outlives a power failure. Raises OSError."""
-    if os.name != "posix":  # elsewhere that takes a file that is open for writing
-        return
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -165,12 +163,6 @@ def prefix_kind(form: bytes) -> Kind:
     return lambda head: re.fullmatch(form, head.split(b"\n", 1)[0].rstrip(b"\r")) is not None
 
 
-def has_keys(*names: str) -> Kind:
-    """Return the kind of content that is a JSON object with these keys near its start, however it is laid out."""
-    keys = [re.compile(rb'"' + name.encode() + rb'"\s*:') for name in names]
-    return lambda head: head.lstrip().startswith(b"{") and all(key.search(head) for key in keys)
-
-
 def _is_of_kind(path: Path, is_kind: Kind) -> bool:
     """Return True for a file of a kind, or one that holds nothing: zeros are what a power failure leaves."""
     try:
@@ -220,29 +212,13 @@ def is_leftover(name: str, names: Iterable[str]) -> bool:
     )
 
 
-def origin_of(plan: str) -> str:
-    """Return the name of the summary beside a resolved scenario, of a run or of a study."""
-    return SUMMARY if plan == SCENARIO else Path(plan).with_suffix(".json").name
-
-
 def copies(folder: Path, plan: str = SCENARIO) -> frozenset[str]:
-    """Return the names of the copies of tables that belong to a folder.
-
-    Those are what run.json (of a sweep sweep.json, and so on) has listed, as long as nobody has changed them; where it
-    lists none (of a run that was killed), those that the resolved scenario names.
-    """
+    """Return the names of the copies of tables that belong to a folder: those that the resolved scenario names."""
     if not is_resolved(folder / plan):
         return frozenset()
-    listed: dict[str, object] = {}
-    with contextlib.suppress(BlocksimError, ValueError, KeyError, TypeError, RecursionError):
-        listed = dict(json.loads(input_files.read_limited(folder / origin_of(plan), MOST_BYTES))["sha256"])
     lines = input_files.read_limited(folder / plan, MOST_BYTES).splitlines()
     present = [name for name in COPIES if (folder / name).is_file() and not (folder / name).is_symlink()]
-    return frozenset(
-        name
-        for name in present
-        if (listed[name] == sha256_of(folder / name) if name in listed else f'table = "{name}"'.encode() in lines)
-    )
+    return frozenset(name for name in present if f'table = "{name}"'.encode() in lines)
 
 
 def read_tables(scenario: Scenario) -> dict[str, bytes]:

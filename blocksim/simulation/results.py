@@ -45,7 +45,7 @@ class EventRecord(BaseModel, frozen=True):
     energy_J: float  # noqa: N815 - taken from what the scene holds; negative where the event has brought some in
 
 
-class Convergence(BaseModel, frozen=True):
+class ImpulseConvergence(BaseModel, frozen=True):
     """How well the impulses of rigid contacts were found, in a whole run."""
 
     passes: int  # over all contacts, as many iterations each as it took; those of rounds of impacts too
@@ -77,20 +77,20 @@ class Summary(BaseModel, frozen=True):
     compile_seconds: float
     solver_seconds: float
     total_seconds: float
-    threads: int = 1
+    threads: int
     resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
     last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
     energy_J: balance.EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
     blocks: int | None = None  # defaults of time.step and of rigid contacts follow from these numbers
     free_blocks: int | None = None  # at the start
     impacts: str | None = None  # contact.impacts, of rigid contacts
-    convergence: Convergence | None = None  # of rigid contacts; None in runs of earlier versions
+    convergence: ImpulseConvergence | None = None  # of rigid contacts
     settled: RestState | None = None  # how it came to rest before time zero, where it did
     events: tuple[EventRecord, ...] = ()  # in the order in which they have happened
-    movement: observables.Movement | None = None  # None in runs of earlier versions and without blocks
+    movement: observables.Movement | None = None  # None without blocks
     warnings: tuple[str, ...]
     environment: dict[str, str]
-    sha256: dict[str, str] = {}
+    sha256: dict[str, str] = {}  # none before files are written
 
     def to_json(self) -> str:
         """Return the text of run.json; numbers that are not finite become null."""

@@ -281,13 +281,13 @@ def _result(
     return results.Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
 
 
-def convergence_of(scene: schemes.AnyScene) -> results.Convergence | None:
+def convergence_of(scene: schemes.AnyScene) -> results.ImpulseConvergence | None:
     """Return how well the impulses of rigid contacts were found so far; None of other schemes."""
     found = schemes.scheme_of(scene).convergence(scene)
-    return None if found is None else results.Convergence.model_validate(found)
+    return None if found is None else results.ImpulseConvergence.model_validate(found)
 
 
-def _convergence_warnings(scenario: Scenario, found: results.Convergence | None) -> Iterator[str]:
+def _convergence_warnings(scenario: Scenario, found: results.ImpulseConvergence | None) -> Iterator[str]:
     """Yield warnings where impulses were not found often enough to matter, and what helps."""
     time = scenario.time
     if found is None or not isinstance(time, Nonsmooth):

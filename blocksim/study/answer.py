@@ -223,12 +223,6 @@ def title_of(scenario: Scenario) -> str:
     return scenario.description or scenario.name
 
 
-def study_page(folder: Path, study: Study) -> StudyPage:
-    """Return a study as a report shows it. Raises InputMissingError or InvalidInputError where it cannot be read."""
-    answer = study.answer.read(folder)
-    return page_of(answer, load_stored(folder / answer.files.plan))
-
-
 def page_of(answer: StudyResult, scenario: Scenario) -> StudyPage:
     """Return a result as a report shows it."""
     table, picture, problems = answer.overview(), None, []

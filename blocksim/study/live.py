@@ -161,9 +161,8 @@ def serve(folder: Path, on_address: Callable[[str], object]) -> None:
 def beside_run(folder: Path) -> Iterator[str]:
     """Show the run that goes into a folder until it ends; give the address of the page, empty without one."""
     command = [sys.executable, "-P", "-m", __name__, str(folder)]
+    server: Any  # with pipes
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:  # noqa: S603 - this program
-        assert server.stdin is not None  # noqa: S101 - it is a pipe
-        assert server.stdout is not None  # noqa: S101 - as above
         try:
             started, _, _ = select.select([server.stdout], [], [], PATIENCE)
             yield server.stdout.readline().strip() if started else ""

@@ -36,7 +36,6 @@ MANIFEST = "manifest.jsonl"
 PATTERN = "manifest*.jsonl"
 SUM = b',"sum":"'
 NEWLINE = b"\n"
-NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 LONGEST = 1 << 30  # bytes of a line that are read at once; a row of a million blocks has 200 million
 MISSING, ENDED_WELL, ENDED_BADLY = range(3)
 
@@ -124,7 +123,7 @@ class Manifest:
         self.path = path
         with files.brief_lock(path.parent):  # who empties the folder sees the file locked, or not at all
             try:
-                self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, files.PERMISSIONS)
+                self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW, files.PERMISSIONS)
             except OSError as error:
                 raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
             is_free = files.takes_lock(self._file)
@@ -355,7 +354,8 @@ def planned_in(folder: Path) -> int | None:
     """Return how many cases the plan in a folder has; None where no plan is there that this version reads."""
     with suppress(BlocksimError):
         sweep = load_stored(folder / sweep_folder.PLAN).sweep
-        return None if sweep is None else plan.count_of(sweep)
+        if sweep is not None:
+            return sweep.samples if sweep.is_sampled else len(plan.design_of(sweep))  # without drawing them
     return None
 
 

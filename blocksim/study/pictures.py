@@ -489,12 +489,11 @@ def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
         studies.draw_tornado(panels, labels, path, title="Which inputs matter", paper=options.paper)
         return path, ""
     if options.kind == MOTION:
-        return draw_motion(lambda: _scenario_at(place), options), ""
+
+        def scenario() -> Scenario:
+            if place.is_file():
+                return load_scenario(place)
+            return load_stored(run_folder.find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)
+
+        return draw_motion(scenario, options), ""
     return draw_run(lambda: run_folder.read_run(place), options)
-
-
-def _scenario_at(place: Path) -> Scenario:
-    """Return the scenario of a file or of a run."""
-    if place.is_file():
-        return load_scenario(place)
-    return load_stored(run_folder.find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)

@@ -237,11 +237,6 @@ def design_of(sweep: Sweep) -> Design:
     )
 
 
-def count_of(sweep: Sweep) -> int:
-    """Return the number of cases, without drawing them. Raises what reading a table raises."""
-    return sweep.samples if sweep.is_sampled else len(design_of(sweep))
-
-
 def remarks(sweep: Sweep) -> list[str]:
     """Return what whoever chose this sweep may want to know."""
     if sweep.mode == "sobol" and sweep.samples & (sweep.samples - 1):

@@ -87,7 +87,9 @@ def subjects_of(
         key = f"part-{len(shown) + 1}"
         study = answer.study_in(place)
         if study is not None:
-            shown.append(parts.study_subject(key, answer.study_page(place, study), str(place)))
+            found = study.answer.read(place)
+            page = answer.page_of(found, load_stored(place / found.files.plan))
+            shown.append(parts.study_subject(key, page, str(place)))
             continue
         if manifest.is_sweep(place):
             subjects, damage = _sweep(key, place, experiment, members)

@@ -1,7 +1,6 @@
 """The folder of a sweep, or of a search: whose it is, what it came from, and that nothing in it is lost by mistake."""
 
 import csv
-import hashlib
 import json
 import logging
 import re
@@ -41,7 +40,7 @@ class FolderKind:
             **{table: files.prefix_kind(form.encode()) for table, form in tables.items()},
             rf"manifest{SHARD}\.jsonl": files.append_only_kind(b'{"number":'),
             rf"timings{SHARD}\.csv": files.append_only_kind(b"case,executor,seconds,host\n"),
-            rf"{name}\.json": files.has_keys("began_at"),
+            rf"{name}\.json": lambda head: head.startswith(b"{") and b'"began_at":' in head,
         }
 
     def is_ours(self, path: Path) -> bool:
@@ -66,14 +65,12 @@ class StudyOrigin(BaseModel, frozen=True):
     mode: str | None = None
     seed: int | None = None
     environment: dict[str, str]
-    sha256: dict[str, str] = {}  # of the copies of tables, as they were written
 
 
 def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: FolderKind = SWEEP) -> None:
     """Make the folder and write the plan into it. Raises OutputExistsError when something else is there."""
     head = f"{kind.head.decode()}{name}. To run it again: {kind.command}\n"
     tables, plan = files.read_tables(base), base.sweep
-    sums = {name: hashlib.sha256(content).hexdigest() for name, content in tables.items()}
     files.make_folder(folder)
     with files.brief_lock(folder):
         try:
@@ -81,20 +78,18 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: F
         except OSError as error:
             raise OutputExistsError(f"{folder}: cannot be created: {error.strerror}") from error
         files.keep_scenario(base, tables, folder, kind.plan, head)
-        known = read_origin(folder, kind)  # whoever continues with a study did not begin it
-        if known is None or known.sha256 != sums:
-            origin = known or StudyOrigin(
+        if read_origin(folder, kind) is None:  # whoever continues with a study did not begin it
+            origin = StudyOrigin(
                 began_at=datetime.now(UTC).isoformat(timespec="seconds"),
                 mode=None if plan is None else plan.mode,
                 seed=plan.seed if plan is not None and plan.is_sampled else None,
                 environment=provenance.environment(),
             )
-            text = origin.model_copy(update={"sha256": sums}).model_dump_json(indent=2)
-            files.write_text(folder / kind.origin, text + "\n")
+            files.write_text(folder / kind.origin, origin.model_dump_json(indent=2) + "\n")
 
 
 def read_origin(folder: Path, kind: FolderKind = SWEEP) -> StudyOrigin | None:
-    """Return what a study came from, None where it is older than this file. Raises InvalidInputError."""
+    """Return what a study came from, None where nobody has begun it. Raises InvalidInputError."""
     path = folder / kind.origin
     try:
         return StudyOrigin.model_validate_json(input_files.read_limited(path, input_files.MEGABYTE))

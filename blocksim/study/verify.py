@@ -35,9 +35,8 @@ from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, inv
 CODE = "code"
 DECIDES = ("blocksim", provenance.ROOM_PREFIX, "python", "numpy", "numba", "llvmlite", "platform", "processor", "cpu")
 ALWAYS = ("name", "steps", "time_step_s", "simulated_time_s", "energy_J")
-UNLESS_INTERRUPTED = ("reason", "exit_code")
-# what earlier versions did not keep is not there, or null
 OF_THE_MOTION = ("settled", "events", "movement", "convergence")
+UNLESS_INTERRUPTED = ("reason", "exit_code")
 HASHES = ("run", "scenario_hash")  # of the code, or of what it makes of a file, too
 SAMPLE = 16  # rows, where nobody says how many
 CASE, INSIDE = "case", "inside"
@@ -62,11 +61,10 @@ def differing_entries(
     The final state and the status are not among them: they are reported by themselves.
     """
     whole = then.status != INTERRUPTED
-    names = [*ALWAYS, *(UNLESS_INTERRUPTED if whole else ()), *(HASHES if same_code else ())]
+    names = [*ALWAYS, *OF_THE_MOTION, *(UNLESS_INTERRUPTED if whole else ()), *(HASHES if same_code else ())]
     stored, wanted = _read_entries(folder / files.SUMMARY), json.loads(now.to_json())
     if not whole and same_code:  # the repetition is of a scenario with another end
         wanted |= {name: getattr(then, name) for name in HASHES}
-    names += [name for name in OF_THE_MOTION if same_code or stored.get(name)]
     found = [one for name in names for one in apart(files.SUMMARY, name, stored.get(name), wanted[name])]
     # the warnings are those of now, after what was reported when the run went on or began again, or read a drawing
     before = then.warnings[: len(then.warnings) - len(now.warnings)]
@@ -83,7 +81,7 @@ def differing_entries(
 def apart(file: str, entry: str, stored: Any, now: Any) -> Iterator[EntryDifference]:
     """Yield the differences of an entry, or of those in it."""
     if isinstance(stored, dict) and isinstance(now, dict):
-        for name, value in stored.items():  # a version before may have had fewer
+        for name, value in stored.items():
             yield from apart(file, f"{entry}.{name}".lstrip("."), value, now.get(name))
     elif isinstance(stored, list) and isinstance(now, list) and len(stored) == len(now):
         for number, values in enumerate(zip(stored, now, strict=True)):

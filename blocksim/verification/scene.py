@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import REACHED, World
 from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario.models import timeline
 from blocksim.simulation import balance, schemes
 from blocksim.simulation.schemes import AnyScene, build_scene, measure_row, scheme_of
 from blocksim.verification import closed_forms as forms
@@ -138,8 +139,7 @@ class CaseScene:
         """The key of impacts: with rigid contacts sequential for a block or two, and for strong restitution."""
         free = sum(not body.get("fixed") for body in self.bodies)
         is_bouncing = self.restitution > STRONG or free <= 1 or (free <= 2 and self.restitution > 0.0)
-        is_rigid = self.time.get("scheme") == "nonsmooth"
-        return {"impacts": "sequential"} if is_rigid and is_bouncing else {}
+        return {"impacts": "sequential"} if is_bouncing and self.time.get("scheme") == timeline.IMPULSES else {}
 
     def scenario(self) -> Scenario:
         """Return the scenario."""

@@ -168,7 +168,10 @@ class Drives(NamedTuple):
 
 def drive_records(scenario: Scenario, placed: Sequence[PlacedBody]) -> Drives:
     """Return all that moves as prescribed in a scenario."""
-    drives, support = motion.drives_of(scenario), support_pieces(scenario)
+    drives, support = motion.drives_of(scenario), STANDSTILL
+    if scenario.motion is not None:  # where it ends before the run, its last piece is constant
+        support = _piece_records(motion.motion_pieces(scenario))
+        support = support if support.size else STANDSTILL
     driven, pieces, count = arrays.zeros(len(drives), arrays.MOVED), [], 0
     for record, drive in zip(driven, drives, strict=True):
         body = placed[drive.body]
@@ -186,12 +189,6 @@ def drive_records(scenario: Scenario, placed: Sequence[PlacedBody]) -> Drives:
     together = arrays.zeros(count + support.size, arrays.MOTION_PIECE)
     together[:] = np.concatenate([*pieces, support])
     return Drives(driven, together, count)
-
-
-def support_pieces(scenario: Scenario) -> arrays.Records:
-    """Return the pieces of the support's motion; where it ends before the run, the last one is constant."""
-    records = STANDSTILL if scenario.motion is None else _piece_records(motion.motion_pieces(scenario))
-    return records if records.size else STANDSTILL
 
 
 def _piece_records(pieces: motion.MotionPieces) -> arrays.Records:

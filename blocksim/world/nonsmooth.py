@@ -22,10 +22,9 @@ LINE_WORDS = CACHE_LINE // 8  # so that no two threads write to one cache line
 
 def stepping_of(scenario: Scenario) -> Stepping:
     """Return how the non-smooth scheme steps a scenario. Raises ValueError for a scenario of another scheme."""
-    if not isinstance(scenario.time, Stepping):
-        message = f"scenario {scenario.name} does not use the non-smooth scheme"
-        raise ValueError(message)  # noqa: TRY004 - the scenario is of the right type
-    return scenario.time
+    if isinstance(scenario.time, Stepping):
+        return scenario.time
+    raise ValueError(f"scenario {scenario.name} does not use the non-smooth scheme")
 
 
 def velocity_tolerance(scenario: Scenario, blocks: int) -> float:

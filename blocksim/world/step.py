@@ -306,10 +306,9 @@ def step_of_contacts(layout: Layout, bounds: Bounds, speeds: Speeds) -> float:
 
 def safety_of(scenario: Scenario) -> float:
     """Return the automatic step as a share of the stability limit. Raises ValueError without springs."""
-    if not isinstance(scenario.time, Explicit):
-        message = f"scenario {scenario.name} does not use the explicit scheme"
-        raise ValueError(message)  # noqa: TRY004 - the scenario is of the right type
-    return scenario.time.safety
+    if isinstance(scenario.time, Explicit):
+        return scenario.time.safety
+    raise ValueError(f"scenario {scenario.name} does not use the explicit scheme")
 
 
 def choose_stride(layout: Layout, bounds: Bounds) -> Stride:

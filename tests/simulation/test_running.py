@@ -212,17 +212,6 @@ def test_passes_that_end_unsolved_are_in_the_summary_and_warned_of(tmp_path: Pat
         assert found.last_change_m_s <= 1e-6
 
 
-def test_summary_of_an_older_version_is_read(kept: Result, tmp_path: Path) -> None:
-    added = ("llvmlite", "cpu", "cpu_features", "code_kernels", "code_scenario", "code_simulation", "code_world")
-    data = json.loads(kept.summary.to_json())
-    data["environment"] = {name: text for name, text in data["environment"].items() if name not in added}
-    del data["threads"], data["sha256"]
-    (tmp_path / "run.json").write_text(json.dumps(data))
-    back = read_summary(tmp_path / "run.json")
-    assert (back.threads, back.sha256) == (1, {})
-    assert back.final_state_sha256 == kept.summary.final_state_sha256
-
-
 def test_command_with_a_name_that_is_no_text_can_be_written(kept: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.argv", ["blocksim", os.fsdecode(b"caf\xe9")])
     summary = kept.summary.model_copy(update={"environment": provenance.environment()})

@@ -1,5 +1,6 @@
 """Limits of the literature, in both schemes: Goodman & Bray's slope, and diamonds of half-overlapped rows."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +20,9 @@ GRAVITY = 9.81
 def with_scheme(document: Document, scheme: str) -> Document:
     """Return a document with a stepping scheme, without what of [time] another one alone knows."""
     known = set(timeline.SCHEMES[scheme].model_fields) - {"step", "force_step"}
-    kept = {key: value for key, value in document.data["time"].items() if key in known}
+    table = document.data["time"]
+    assert isinstance(table, Mapping)
+    kept = {key: value for key, value in table.items() if key in known}
     return replace(document, data={**document.data, "time": {**kept, "scheme": scheme}})
 
 

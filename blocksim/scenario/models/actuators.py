@@ -152,8 +152,3 @@ def _rounded(times: Sequence[float], values: Sequence[float]) -> tuple[loads.Str
         pieces += _change(at - half, 2.0 * half, value - half * before, before, after)
         pieces.append(loads.Stretch(at + half, value + half * after, after))
     return (*pieces[:-1], loads.Stretch(times[-1], values[-1], 0.0))
-
-
-def end_of(actuators: tuple[Actuator, ...]) -> float:
-    """Return when (s) the last head stops."""
-    return max(stretches_of(one.displacement)[-1].start for one in actuators)

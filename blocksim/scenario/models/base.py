@@ -143,22 +143,17 @@ def _identifier(value: object) -> object:
     if not isinstance(value, str):
         raise units.invalid(f"{units.toml(value)} is not a string in quotes")
     allowed = value.isascii() and all(c.isalnum() or c in "._-" for c in value)
-    if not allowed or not 1 <= len(value) <= MAX_NAME or value[0] in ".-":
-        characters = f"1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
+    if not allowed or not 1 <= len(value) <= MAX_NAME or value[0] in ".-" or value[-1] == ".":
+        characters = f"1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first, no . last"
         raise units.invalid(f"{units.toml(value)} is not a name; {characters}")
-    if value.endswith(".") or value.partition(".")[0].upper() in DEVICES:
-        raise units.invalid(f"{units.toml(value)} is not a name: some systems reserve it")
     return value
 
 
 MAX_NAME = 100
-DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(1, 10))}
-"""Names that Windows reserves, whatever follows after a dot."""
-_DEVICE = "([Cc][Oo][Nn]|[Pp][Rr][Nn]|[Aa][Uu][Xx]|[Nn][Uu][Ll]|[Cc][Oo][Mm][1-9]|[Ll][Pp][Tt][1-9])"
 Identifier = Annotated[
     str,
     pydantic.BeforeValidator(_identifier),
-    Field(json_schema_extra={"pattern": rf"^(?!{_DEVICE}(\.|$))[A-Za-z0-9_]([A-Za-z0-9._-]{{0,98}}[A-Za-z0-9_-])?$"}),
+    Field(json_schema_extra={"pattern": "^[A-Za-z0-9_]([A-Za-z0-9._-]{0,98}[A-Za-z0-9_-])?$"}),
 ]
 """A name that can be a folder or a table cell on every system."""
 

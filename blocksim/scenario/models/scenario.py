@@ -9,7 +9,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from blocksim.notebook import Shown
 from blocksim.scenario import units as q
-from blocksim.scenario.models.actuators import Actuator, end_of
+from blocksim.scenario.models.actuators import Actuator, stretches_of
 from blocksim.scenario.models.base import HELD, SYSTEMS, Identifier, OneOf, SystemTable, Table, read_tables, setting
 from blocksim.scenario.models.contact import Contact, Friction, Pair
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
@@ -74,7 +74,8 @@ class Scenario(Shown, Table):
     @pydantic.model_validator(mode="after")
     def _until_heads_stop(self) -> Self:
         if self.actuators and "end" not in self.time.model_fields_set:
-            time = self.time.model_copy(update={"end": end_of(self.actuators)})
+            end = max(stretches_of(one.displacement)[-1].start for one in self.actuators)
+            time = self.time.model_copy(update={"end": end})
             object.__setattr__(self, "time", time)  # the table is frozen
         return self
 

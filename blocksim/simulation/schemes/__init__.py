@@ -147,7 +147,7 @@ class Scheme:
     lost_contact: Callable[[Any, Overlaps], str] = lambda *_: ""
     # why it has ended, where not by contact.max_overlap
     convergence: Callable[[Any], Mapping[str, float] | None] = lambda _: None
-    # how well its equations were solved so far: entries of results.Convergence
+    # how well its equations were solved so far: entries of results.ImpulseConvergence
     warning: Callable[[Any, float, float], str] = lambda *_: ""
     # of contacts in a scene that has finished, given the largest overlap and the smallest side of a block (m)
 

@@ -26,7 +26,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.errors import BlocksimError, InvalidInputError, OutputError
+from blocksim.errors import InvalidInputError, OutputError
 from blocksim.scenario import Scenario, events, input_files, place_bodies
 from blocksim.simulation import files, instruments, trajectory
 from blocksim.world.free_memory import available_bytes, chunk_rows, readable
@@ -320,17 +320,9 @@ def read_rows(path: Path, systems: Sequence[SystemInScene]) -> tuple[float, inst
                 return _read(path, file, systems)
         except InvalidInputError:
             pause = next(pauses, None)
-            if pause is None or not is_left_open(path):
+            if pause is None or not _is_open(input_files.read_head(path, SUPERBLOCK.size)):
                 raise
             time.sleep(pause)
-
-
-def is_left_open(path: Path) -> bool:
-    """Return True if a file has a writer who has not closed it: a run that continues, or was killed."""
-    try:
-        return _is_open(input_files.read_head(path, SUPERBLOCK.size))
-    except BlocksimError:
-        return False
 
 
 def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, instruments.FrameRows]:
