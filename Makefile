@@ -87,11 +87,11 @@ faults: $(DEV_STAMP) ## Put deliberate faults into the code, one at a time: does
 
 .PHONY: verify-table
 verify-table: $(DEV_STAMP) ## Measure all verification cases and write their table into blocksim/verification/README.md
-	$(VENV_PYTHON) -m blocksim.verification.reference blocksim/verification/README.md --measure
+	$(VENV_PYTHON) -m tests.verification.reference blocksim/verification/README.md --measure
 
 .PHONY: findings
 findings: $(DEV_STAMP) ## Run what results/README.md quotes and write its table
-	$(VENV_PYTHON) -m blocksim.verification.findings results/README.md --measure
+	$(VENV_PYTHON) -m tests.verification.findings results/README.md --measure
 
 WALLS := 40:36.15 100:96.15 250:246.15  # vertical load in the name of a test, and its part that is not the beam's, kN
 .PHONY: walls
@@ -139,7 +139,7 @@ format: $(DEV_STAMP) ## Bring the code into shape
 
 .PHONY: readme
 readme: $(DEV_STAMP) ## Write the table of scenario keys in scenarios/README.md from the models
-	$(VENV_PYTHON) -m blocksim.scenario.key_table scenarios/README.md
+	$(VENV_PYTHON) -m tests.key_table scenarios/README.md
 
 .PHONY: pictures
 pictures: $(RUN_STAMP) ## Draw the pictures of the findings in results/

@@ -32,7 +32,7 @@ from urllib.parse import unquote, urlsplit
 
 import blocksim
 from blocksim.cli.commands import COMMANDS, GROUPS, load_command
-from blocksim.scenario.key_table import BEGIN, END, key_table
+from tests.key_table import BEGIN, END, key_table
 
 ROOT = Path(__file__).parents[1]
 OWN = ROOT / ".docs"

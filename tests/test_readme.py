@@ -10,7 +10,8 @@ import typer
 from blocksim import __version__
 from blocksim.cli.commands import app
 from blocksim.scenario import Document
-from blocksim.scenario.key_table import BEGIN, END, key_table, with_part
+from tests.key_table import BEGIN, END, key_table
+from tests.verification.reference import with_part
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -92,7 +92,7 @@ def _distrust_current_folder() -> None:
     """Take no module from the current folder, here and in processes to be started: it may be a stranger's.
 
     An empty path means that folder: `python -c` has one, and so has a PYTHONPATH that ends with a colon. Modules that
-    Python itself has imported by now come from there all the same.
+    Python itself has imported by now still come from there.
     """
     named, unwanted = os.environ.get("PYTHONPATH", ""), {""}
     with suppress(OSError):  # the folder was removed

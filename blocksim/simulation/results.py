@@ -77,7 +77,7 @@ class Summary(BaseModel, frozen=True):
     compile_seconds: float
     solver_seconds: float
     total_seconds: float
-    threads: int
+    threads: int = 1
     resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
     last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
     energy_J: balance.EnergyLedger  # noqa: N815 - the unit of energy is a capital letter

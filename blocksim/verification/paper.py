@@ -25,13 +25,19 @@ from blocksim.simulation import files, results
 from blocksim.simulation.run import simulate
 from blocksim.study.answer import number_text
 from blocksim.verification import closed_forms as forms
-from blocksim.verification.reference import markdown
 from blocksim.view import run_data, scene, studies, style
 from blocksim.view.final import draw_final
 from blocksim.view.strip import draw_strip
 
 MILLI = 1e3
 LEAST_APEX = 2e-5  # m; lower bounces are not distinguished from rest
+
+
+def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table as Markdown; the minus sign of numbers is a proper one."""
+    proper = ([f"−{cell[1:]}" if cell.startswith("-") else cell for cell in row] for row in rows)
+    head, *lines = (f"| {' | '.join(cells)} |" for cells in (heads, *proper))
+    return "\n".join([head, f"|{' --- |' * len(heads)}", *lines])
 
 
 class Bounce(NamedTuple):

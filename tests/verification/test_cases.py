@@ -13,7 +13,10 @@ from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Case, CaseOutcome, Row, Setting, at_least, run_case
 from blocksim.verification.cases import CASES, SettingError, choose_cases, exclusions
-from blocksim.verification.reference import (
+from blocksim.verification.soil import SOIL_CASES
+from blocksim.verification.toppling import DominoModel, limit
+from blocksim.world import bodies
+from tests.verification.reference import (
     BEGIN,
     END,
     RIGID,
@@ -26,9 +29,6 @@ from blocksim.verification.reference import (
     table,
     with_table,
 )
-from blocksim.verification.soil import SOIL_CASES
-from blocksim.verification.toppling import DominoModel, limit
-from blocksim.world import bodies
 
 ROOT = Path(__file__).parents[2]
 STORED = read_store(ROOT / STORE)

@@ -11,8 +11,8 @@ from blocksim.errors import BlocksimError
 from blocksim.scenario import load_scenario
 from blocksim.simulation.run import simulate
 from blocksim.verification import paper as laws
-from blocksim.verification.findings import BEGIN, FINDINGS, STORE, Finding, measure_finding, with_table
 from blocksim.verification.paper import COLLAPSES, write_paper
+from tests.verification.findings import BEGIN, FINDINGS, STORE, Finding, measure_finding, with_table
 
 SCENARIOS = Path(laws.__file__).parents[2] / "scenarios"
 RESULTS = SCENARIOS.parent / "results"

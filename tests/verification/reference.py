@@ -1,6 +1,6 @@
-"""The verification tables of this folder's README: measured, kept in results/verify.json, written as Markdown.
+"""The tables of blocksim/verification/README.md: measured, kept in results/verify.json, written as Markdown.
 
-`python -m blocksim.verification.reference blocksim/verification/README.md` writes the tables from the kept results.
+`python -m tests.verification.reference blocksim/verification/README.md` writes the tables from the kept results.
 With `--measure` all cases are run first (twenty-five minutes) and the results replaced; names of columns after it limit
 that to these: `--measure nonsmooth` takes half a minute and leaves all others as they are, `--measure soil` is soil.
 """
@@ -13,11 +13,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from blocksim.scenario.key_table import with_part
 from blocksim.scenario.models.timeline import IMPULSES
 from blocksim.simulation.files import write_text
 from blocksim.verification.case import Case, Row, Setting, run_case
 from blocksim.verification.cases import CASES, choose_cases, exclusions
+from blocksim.verification.paper import markdown
 
 BEGIN = "<!-- verify: written by `make verify-table` -->"
 END = "<!-- end of verify -->"
@@ -47,11 +47,10 @@ def rows_of(stored: Stored, head: str, case: Case) -> list[Row]:
     return [Row(**{**row, "measured": float("nan") if row["measured"] is None else row["measured"]}) for row in rows]
 
 
-def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table as Markdown; the minus sign of numbers is a proper one."""
-    proper = ([f"−{cell[1:]}" if cell.startswith("-") else cell for cell in row] for row in rows)
-    head, *lines = (f"| {' | '.join(cells)} |" for cells in (heads, *proper))
-    return "\n".join([head, f"|{' --- |' * len(heads)}", *lines])
+def with_part(text: str, begin: str, part: str, end: str) -> str:
+    """Return a page with what stands between two marks replaced."""
+    marked = re.compile(f"{re.escape(begin)}.*{re.escape(end)}", re.DOTALL)
+    return marked.sub(lambda _: f"{begin}\n{part}\n{end}", text)
 
 
 def table(stored: Stored) -> str:

@@ -1,6 +1,6 @@
 """Run-outs of the three blocks that results/README.md quotes: measured, kept with their command and version.
 
-`python -m blocksim.verification.findings results/README.md` rewrites the table from results/findings.json. With
+`python -m tests.verification.findings results/README.md` rewrites the table from results/findings.json. With
 `--measure` every run is repeated first: seconds for exact edges, some minutes for boundary particles. The tests repeat
 the quick ones and compare them with the table.
 """
@@ -14,10 +14,11 @@ from typing import Any
 
 from blocksim import __version__
 from blocksim.analysis.compare import Verdict
-from blocksim.scenario import key_table, load_scenario
+from blocksim.scenario import load_scenario
 from blocksim.study.compare import compare_run
 from blocksim.study.run import run
-from blocksim.verification.reference import markdown
+from blocksim.verification.paper import markdown
+from tests.verification.reference import with_part
 
 BEGIN = "<!-- findings: written by `make findings` -->"
 END = "<!-- end of findings -->"
@@ -92,7 +93,7 @@ def with_table(text: str, stored: Sequence[dict[str, Any]]) -> str:
         ]
         inside = "all" if len(row["inside"]) == len((*BLOCKS, "rotations")) else ", ".join(row["inside"])
         rows.append([finding.title, f"`{finding.command}`", *cells, inside])
-    return key_table.with_part(text, BEGIN, markdown(HEADS, rows), END)
+    return with_part(text, BEGIN, markdown(HEADS, rows), END)
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -16,6 +16,7 @@ from blocksim.scenario.overrides import options, si_unit
 from blocksim.scenario.structures import KINDS
 from blocksim.scenario.structures.base import Structure
 from blocksim.scenario.structures.masonry import Opening
+from tests.verification.reference import with_part
 
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"
@@ -62,12 +63,6 @@ def key_table() -> str:
     ]
     rows = [row for prefix, model in sections for row in _rows(prefix, model)]
     return "\n".join([HEAD, *rows])
-
-
-def with_part(text: str, begin: str, part: str, end: str) -> str:
-    """Return a page with what stands between two marks replaced."""
-    marked = re.compile(f"{re.escape(begin)}.*{re.escape(end)}", re.DOTALL)
-    return marked.sub(lambda _: f"{begin}\n{part}\n{end}", text)
 
 
 def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
