@@ -219,7 +219,7 @@ class LimitAnswer(RangeAnswer, frozen=True):
     stiffness_scale: float | None
     static_bound: float | None = None  # beyond it no equilibrium exists; the search began there
     static_side: Literal["above", "below"] | None = None  # where that is
-    most_runs: int = MOST_SCANNED  # at which the search stops; versions before had no limit
+    most_runs: int = MOST_SCANNED  # at which the search stops
     is_cut: bool = False  # stopped there
     runs: int
     brackets: tuple[Bracket, ...] = Field(alias="changes")

@@ -1,8 +1,7 @@
 """Rows of sweep.csv: what is kept of a case, how it stands in a cell, and whether it is inside all measured ranges.
 
 A column of varied values is a number column where every value is one, and has a unit where some value was typed with
-one; its head is then `ground.tilt [deg]`, as in a table of cases. All other values stand as they were given. Tables
-that were written before have the bare key in their heads, and are read anyway.
+one; its head is then `ground.tilt [deg]`, as in a table of cases. All other values stand as they were given.
 """
 
 import math

@@ -32,7 +32,6 @@ from blocksim.study import answer, manifest, plan, run_folder, sweep, sweep_fold
 from blocksim.study.executors.ensemble import INTERRUPTED, rows_of
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row
 
-CODE = "code"
 DECIDES = ("blocksim", provenance.ROOM_PREFIX, "python", "numpy", "numba", "llvmlite", "platform", "processor", "cpu")
 ALWAYS = ("name", "steps", "time_step_s", "simulated_time_s", "energy_J")
 OF_THE_MOTION = ("settled", "events", "movement", "convergence")
@@ -203,11 +202,9 @@ def origin_differences(then: Mapping[str, str]) -> tuple[tuple[OriginDifference,
     What it lacks cannot be compared. What is named by the hash of other code has another name.
     """
     now = provenance.environment()
-    whole = () if any(name.startswith(provenance.ROOM_PREFIX) for name in then) else (CODE,)  # rooms say more
-    known = [name for name in now if name in then and (name in whole or name.startswith(DECIDES))]
+    known = [name for name in now if name in then and name.startswith(DECIDES)]
     others = tuple(OriginDifference(name, then[name], now[name]) for name in known if then[name] != now[name])
-    is_code = (one.name in {CODE, "blocksim"} or one.name.startswith(provenance.ROOM_PREFIX) for one in others)
-    return others, not any(is_code)
+    return others, not any(one.name.startswith(("blocksim", provenance.ROOM_PREFIX)) for one in others)
 
 
 @dataclass(frozen=True)
