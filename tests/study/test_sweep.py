@@ -185,7 +185,6 @@ PLACED = {
     "timings.csv": "sample,time\n",
     "manifest.jsonl": "{}\n",
     "sweep.json": "{}\n",
-    "experiment.csv": "corrected by hand\n",
 }
 
 
