@@ -121,7 +121,7 @@ def leaning_column(size: float) -> list[dict[str, object]]:
 HERTZ = {"law": "hertz-mindlin", "contact_radius": 0.05}
 PARTICLES = {"model": "particles", "particle_spacing": 0.05}
 KERNEL = {"model": "kernel", "particle_spacing": 0.1, "smoothing_length": 0.15}
-SCENES = {
+SCENES: dict[str, tuple[Any, str, dict[str, Any], float, int]] = {
     "wall": (loose_wall, EXPLICIT, {}, 0.2, 1000),
     "hertz": (loose_wall, EXPLICIT, HERTZ, 0.2, 3000),
     "particles": (loose_wall, EXPLICIT, PARTICLES, 0.2, 400),
