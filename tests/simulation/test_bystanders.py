@@ -1,4 +1,4 @@
-"""What else is in a scene of rigid contacts changes no bit of what happens elsewhere, at a given step and tolerance."""
+"""What else is in a scene of rigid contacts is no matter for what happens elsewhere, at a given step and tolerance."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -38,9 +38,18 @@ def end_of(bodies: list[dict[str, Any]], contact: Mapping[str, object], **tables
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_blocks_and_loads_far_away_change_no_bit(seed: int) -> None:
+def test_loads_on_blocks_far_away_change_no_bit(seed: int) -> None:
     bodies, contact = scene_of(seed)
-    alone = end_of(bodies, contact)[: len(bodies)]
     load = {"kind": "force", "body": str(len(bodies) + 1), "magnitude": "1 mN", "direction": "0 deg"}
-    loaded = end_of([*bodies, *BYSTANDERS], contact, loads=[load])
-    assert loaded[: len(bodies)].tolist() == alone.tolist()
+    free, loaded = (end_of([*bodies, *BYSTANDERS], contact, loads=loads)[: len(bodies)] for loads in ([], [load]))
+    assert loaded.tolist() == free.tolist()
+
+
+@pytest.mark.parametrize("impacts", ["simultaneous", "sequential"])
+@pytest.mark.parametrize("restitution", [0.0, 0.2, 0.5, 0.501])
+def test_idle_blocks_far_away_change_no_bit_of_a_row_that_is_struck(impacts: str, restitution: float) -> None:
+    row = [{"x": k * WIDTH, "y": HEIGHT / 2} for k in range(5)]
+    row[0] |= {"x": -0.01, "velocity": [1.0, 0.0]}
+    contact = {"impacts": impacts, "restitution": restitution}
+    ends = [end_of([*row, *BYSTANDERS[:count]], contact)[: len(row)].tolist() for count in (0, 7, 8, 9)]
+    assert ends[1:] == ends[:-1]
