@@ -109,7 +109,7 @@ OVERHANG = Observable(
 
 def test_an_added_observable_is_found_everywhere(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(OBSERVABLES, OVERHANG.name, OVERHANG)
-    scenario = ("scenarios/slide.toml", *SOFT, "--set", "time.end=0.1")
+    scenario = ("scenarios/slide.toml", *SOFT, "--set", "time.end=0.3")
     run = blocksim("run", *scenario, "--set", "ground.tilt=30deg", "--out", "run")
     value = json.loads(Path("run/run.json").read_text())["movement"]["overhang_mm"]
     assert f"greatest overhang {value:.2f}" in run.err.replace("\n", " ")

@@ -47,9 +47,13 @@ def test_loads_on_blocks_far_away_change_no_bit(seed: int) -> None:
 
 @pytest.mark.parametrize("impacts", ["simultaneous", "sequential"])
 @pytest.mark.parametrize("restitution", [0.0, 0.2, 0.5, 0.501])
-def test_idle_blocks_far_away_change_no_bit_of_a_row_that_is_struck(impacts: str, restitution: float) -> None:
+def test_idle_blocks_far_away_change_less_of_a_struck_row_than_the_tolerance_of_the_velocity_pass(
+    impacts: str, restitution: float
+) -> None:
     row = [{"x": k * WIDTH, "y": HEIGHT / 2} for k in range(5)]
     row[0] |= {"x": -0.01, "velocity": [1.0, 0.0]}
     contact = {"impacts": impacts, "restitution": restitution}
-    ends = [end_of([*row, *BYSTANDERS[:count]], contact)[: len(row)].tolist() for count in (0, 7, 8, 9)]
-    assert ends[1:] == ends[:-1]
+    alone = end_of(row, contact)
+    for count in (7, 8, 9):  # 12 to 14 blocks
+        end = end_of([*row, *BYSTANDERS[:count]], contact)[: len(row)]
+        np.testing.assert_allclose(end, alone, rtol=0.0, atol=1e-9)
