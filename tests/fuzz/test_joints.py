@@ -131,7 +131,7 @@ class Pieces:
             restitution=float(random.choice([0.0, 0.5, 1.0 if springs else 0.9])),
             friction=float(random.choice([0.0, 0.6])),
             contact={"law": law, "max_overlap": 2e-3} if springs else {},
-            time={} if springs else {"scheme": scheme, "step": 1e-4, "force_step": True},
+            time={} if springs else {"scheme": scheme, "step": 1e-4, "force_step": True, "velocity_tolerance": 1e-12},
         )
         self.numbers = np.array(numbers)
         self.scene = build_scene(scene.scenario())
