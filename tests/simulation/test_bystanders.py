@@ -50,7 +50,7 @@ def test_loads_on_blocks_far_away_change_no_bit(seed: int) -> None:
 def test_idle_blocks_far_away_change_less_of_a_struck_row_than_the_tolerance_of_the_velocity_pass(
     impacts: str, restitution: float
 ) -> None:
-    row = [{"x": k * WIDTH, "y": HEIGHT / 2} for k in range(5)]
+    row: list[dict[str, Any]] = [{"x": k * WIDTH, "y": HEIGHT / 2} for k in range(5)]
     row[0] |= {"x": -0.01, "velocity": [1.0, 0.0]}
     contact = {"impacts": impacts, "restitution": restitution}
     alone = end_of(row, contact)
