@@ -101,7 +101,9 @@ def read_drawing(path: Path) -> Drawing:
     except BlocksimError as error:
         raise DrawingError(str(error)) from None
     except damage as error:
-        raise DrawingError(f"not a {'DXF' if is_dxf else 'GeoJSON'} file: {str(error)[:100]}") from None
+        # the package repeats the path, which may be long
+        words = str(error).replace(str(path), path.name)[:100]
+        raise DrawingError(f"not a {'DXF' if is_dxf else 'GeoJSON'} file: {words}") from None
     outlines = found.outlines
     if len(outlines) == 0:
         raise DrawingError("no closed polyline in it" if is_dxf else "no polygon in it")
