@@ -3,9 +3,11 @@
 A value is far where it is 5 standard deviations or more of the other repeats away from their mean; of normal repeats
 one in fifty with four others, and one in a hundred with five. Fewer others are as often that far away by more, by the
 quantiles of Student's t: see FAR. A factor between a value and the others, where these agree, is that of two units.
+Of two repeats nothing but such a factor is known, and not which of them is wrong.
 """
 
 from collections.abc import Iterator, Sequence
+from math import inf
 from statistics import fmean, median, median_low, stdev
 
 READINGS = {"mm": 0.5, "deg": 1.0}
@@ -27,14 +29,15 @@ def far_values(
     """
     usual = median_low(values)
     agreeing = sum(abs(one - usual) <= AGREE * abs(usual) for one in values)
-    for place, value in enumerate(values if len(values) > min(FAR) else ()):
+    for place, value in enumerate(values if len(values) > 1 else ()):
         others = [*values[:place], *values[place + 1 :]]
-        mean, s = fmean(others), max(stdev(others), least)
+        mean, s = fmean(others), max(stdev(others), least) if len(others) > 1 else inf
         away = abs(value - mean) / s if s > 0.0 else 0.0
         is_far = not is_chosen and away >= FAR.get(len(others), FAR_FROM_MANY)
         factor = factor_between(value, median(others), unit) if 2 * agreeing >= len(values) else ""
         if is_far or (factor and abs(value - usual) > FAR_FROM_MANY * least):
-            why = f"{away:.3g} standard deviations of the others away" if is_far else "unlike the others"
+            unlike = "the others" if len(others) > 1 else f"the other repeat, {others[0]:g} {unit}"
+            why = f"{away:.3g} standard deviations of the others away" if is_far else f"unlike {unlike}"
             yield place, f"{value:g} {unit} is {why}" + (f" ({factor}): is the unit right?" if factor else "")
 
 

@@ -159,12 +159,17 @@ FAR = {
     "a thousand times": "0.0713 70.2 72.5 69.9 71.8",
     "two of six in cm": "7.02 70.2 7.13 72.5 69.9 71.8",
     "one of three in m": "70.2 0.0713 72.5",
-    "neither of two": "7.13 71.3",
+    "two, one in cm": "7.13 71.3",
     "far, and of no unit": "70.2 72.5 69.9 71.8 90.0",
     "just below": "70 71 72 73 77.9",
     "within the reading": "16 16 16 16 18",
     "beyond the reading": "16 16 16 16 19",
     "of another sign": "70.2 72.5 69.9 71.8 -71.1",
+    "two, the first in metres": "0.036 36",
+    "two, a ratio of no units": "-21.4 -262",
+    "two that scatter": "36 72",
+    "two within readings": "0.2 2",
+    "two on either side": "-36 36000",
 }
 
 
