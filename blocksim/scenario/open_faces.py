@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import geometry, placement
+from blocksim.scenario import geometry, overlap, placement
 from blocksim.scenario.models.loads import BACK, FRONT, NORMALS, AnyLoad, Face, OnBody, Pressure
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.placement import PlacedBody
@@ -117,11 +117,21 @@ class _Shapes:
         self.corners = corners
         self.normals, self.are_edges = geometry.outward_normals(corners)
         self.low, self.high = corners.min(axis=1), corners.max(axis=1)
+        members, strips, _, self.strip_height = overlap.level_strips(self.low[:, 1], self.high[:, 1])
+        order = np.argsort(strips, kind="stable")
+        self.strips, self.members = strips[order], members[order]
+
+    def near(self, low: Floats, high: Floats) -> NDArray[np.intp]:
+        """Return the polygons whose boxes meet a box (m), some twice; only those at its height are looked at."""
+        first, last = math.floor(low[1] / self.strip_height), math.floor(high[1] / self.strip_height)
+        begin, end = self.strips.searchsorted((first, last + 1))
+        some = self.members[begin:end]
+        return np.asarray(some[((self.low[some] <= high) & (self.high[some] >= low)).all(axis=1)])
 
     def on_line(self, begin: Floats, way: Floats, most: float) -> list[Interval]:
         """Return the parts of a line from a place on, at most as long (m), that lie in polygons."""
         ends = np.stack([begin, begin + most * way])
-        near = np.flatnonzero(((self.low <= ends.max(axis=0)) & (self.high >= ends.min(axis=0))).all(axis=1))
+        near = self.near(ends.min(axis=0), ends.max(axis=0))
         normals, are_edges = self.normals[near], self.are_edges[near]
         outside = np.einsum("nkd,nkd->nk", normals, begin - self.corners[near])  # m, of its begin
         rate = normals @ way
@@ -157,8 +167,10 @@ def _open_faces(
     corners = _corners_of(placed)
     left, right = float(corners[..., 0].min()), float(corners[..., 0].max())
     length, depth = right - left, placement.smallest_width(placed)
-    blocks, walls = _Shapes(corners[own]), _Shapes(corners)
-    ground = _Shapes(_ground_below(scenario, left - length, right + length, depth))
+    ground = _ground_below(scenario, left - length, right + length, depth)
+    most = max(corners.shape[1], ground.shape[1])
+    solid = [np.pad(one, ((0, 0), (0, most - one.shape[1]), (0, 0)), mode="edge") for one in (corners, ground)]
+    blocks, all_solid = _Shapes(corners[own]), _Shapes(np.concatenate(solid))
     for number in own:
         body = placed[number]
         if body.fixed:
@@ -172,8 +184,7 @@ def _open_faces(
             if side * outward[0] < -AS_NEAR:
                 continue
             before = first + 0.5 * strip * outward
-            covered = [*walls.on_line(before, way, size), *ground.on_line(before, way, size)]
-            for low, high in _gaps(covered, size):
+            for low, high in _gaps(all_solid.on_line(before, way, size), size):
                 middle = before + 0.5 * (low + high) * way
                 if high - low <= strip or blocks.on_line(middle, np.array([side, 0.0]), length):
                     continue

@@ -188,11 +188,23 @@ def overlapping_pairs(
         yield from zip(first[deep].tolist(), (second[deep] - begin).tolist(), depth[deep].tolist(), strict=True)
 
 
+def level_strips(low: Floats, high: Floats) -> tuple[Integers, Integers, Integers, float]:
+    """Return boxes once for every level strip that they reach into, it, all lowest ones, and how high strips are (m).
+
+    That is as high as boxes are in the mean, so that all sizes together reach into three a box at most.
+    """
+    height = float((high - low).mean()) if (high > low).any() else 1.0
+    with np.errstate(over="ignore"):
+        first, last = (np.clip(np.floor(end / height), -FARTHEST, FARTHEST).astype(int) for end in (low, high))
+    counts = last - first + 1
+    box = np.repeat(np.arange(counts.size), counts)
+    return box, first[box] + np.arange(box.size) - np.repeat(np.cumsum(counts) - counts, counts), first, height
+
+
 def near_pairs(outlines: Outlines) -> Iterator[Pairs]:
     """Yield the indices of all pairs whose axis-parallel boxes meet, each pair once, many at a time.
 
-    Boxes lie in level strips as high as they are in the mean, so that all sizes together reach into three a box at
-    most. In a strip, sorted by their left ends, those that follow a box up to its right end meet it along x.
+    In a level strip, sorted by their left ends, those that follow a box up to its right end meet it along x.
     """
     half_x, half_y = outlines.half_extent(1.0, 0.0), outlines.half_extent(0.0, 1.0)
     left, right, low, high = outlines.x - half_x, outlines.x + half_x, outlines.y - half_y, outlines.y + half_y
@@ -201,12 +213,7 @@ def near_pairs(outlines: Outlines) -> Iterator[Pairs]:
         is_near = (left[i] <= right[j]) & (left[j] <= right[i]) & (low[i] <= high[j]) & (low[j] <= high[i])
         yield i[is_near], j[is_near]
         return
-    strip_height = 2.0 * float(half_y.mean()) if half_y.any() else 1.0  # m
-    with np.errstate(over="ignore"):
-        first, last = (np.clip(np.floor(end / strip_height), -FARTHEST, FARTHEST).astype(int) for end in (low, high))
-    counts = last - first + 1
-    box = np.repeat(np.arange(counts.size), counts)
-    strip = first[box] + np.arange(box.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    box, strip, first, _ = level_strips(low, high)
     ends = np.concatenate([left[box], right[box]])
     order = np.lexsort((np.repeat([0, 1], box.size), ends, np.tile(strip, 2)))
     is_left = order < box.size

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from blocksim.errors import StoppedEarlyError
+
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGUSR1")  # the last: of batch systems ahead of their time limit
 SIGNALS = tuple(signal.Signals[name] for name in NAMES if hasattr(signal, name))
 FOR_ALL = tuple(number for number in SIGNALS if number != signal.SIGTERM)  # a terminal or batch system sends them so
@@ -58,6 +60,11 @@ class WallTime:
         if self.limit is None or time.monotonic() - self.began < self.limit:
             return ""
         return f"wall-time limit of {self.limit:g} s reached"
+
+    def check(self) -> None:
+        """Raise StoppedEarlyError after the limit, where a scene is being built."""
+        if why := self.reason():
+            raise StoppedEarlyError(f"{why} while the scene was built; nothing is kept of that")
 
 
 @contextmanager

@@ -371,19 +371,20 @@ class _Settlement:
         places = {"x": x, "y": y, "cosine": np.cos(angle), "sine": np.sin(angle)}
         moved = {name: np.concatenate([one, getattr(now, name)[self.count :]]) for name, one in places.items()}
         later = now._replace(**moved)
-        extent = np.hypot(later.half_x, later.half_y)
-        free = np.flatnonzero(self.is_free)
-        one, other = (pairs.ravel() for pairs in np.meshgrid(free, np.arange(extent.size), indexing="ij"))
-        are_near = np.hypot(later.x[one] - later.x[other], later.y[one] - later.y[other]) < extent[one] + extent[other]
-        chosen = are_near & (~np.isin(other, free) | (one < other))  # each pair once
-        one, other = one[chosen], other[chosen]
         most = ARC * share**2 * self.smallest
-        deeper = overlap.penetration(later.some(one), later.some(other)) - np.maximum(
-            overlap.penetration(now.some(one), now.some(other)), 0.0
-        )
         ground = float(self.scene.world.bodies[-1].y)
         below = (np.minimum(now.bottom, ground) - later.bottom)[: self.count] if np.isfinite(ground) else np.zeros(1)
-        return bool((deeper > most).any() or (below > most).any())
+        if (below > most).any():
+            return True
+        is_free = np.zeros(later.x.size, bool)
+        is_free[: self.count] = self.is_free
+        for one, other in overlap.near_pairs(later):
+            moved = is_free[one] | is_free[other]
+            a, b = one[moved], other[moved]
+            before = np.maximum(overlap.penetration(now.some(a), now.some(b)), 0.0)
+            if (overlap.penetration(later.some(a), later.some(b)) - before > most).any():
+                return True
+        return False
 
     def _kinetic(self) -> float:
         bodies = self.bodies

@@ -124,7 +124,9 @@ def simulate(
     The result does not depend on the number of threads; small scenes do not use them all.
     """
     limit, began = WallTime(wall_time), time.perf_counter()
+    limit.check()
     built = schemes.build(scenario)
+    limit.check()
     began += _compiled(scenario)
     with _attended(scenario, built, threads, limit, on_progress) as (recorder, team, control):
         scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
@@ -153,7 +155,9 @@ def simulate_into(
     `interrupted`, and what was computed until then is kept.
     """
     limit, began = WallTime(precautions.wall_time, precautions.time_over), time.perf_counter()
+    limit.check()
     built = schemes.build(scenario)
+    limit.check()
     refuse_full_disk(folder, scenario, built.scene)
     tables = files.read_tables(scenario)
     with files.folder_lock(folder):

