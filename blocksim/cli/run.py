@@ -62,8 +62,9 @@ def run_command(
             try:
                 result = run.run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))
             except rest_state.SettleError as error:
+                held = ' --set "start.hold=[]"' * bool(ready.start.hold)
                 raise rest_state.SettleError(
-                    f"{error}; --set start.settle=false runs it from where it is placed"
+                    f"{error}; --set start.settle=false{held} runs it from where it is placed"
                 ) from None
     # SIGHUP reports that the terminal is lost
     with nullcontext() if result.status == rows.FINISHED else suppress(OSError):

@@ -353,7 +353,9 @@ class Document:
 
     def problem(self, finding: mistakes.Mistake) -> Problem:
         """Show a finding where it can be corrected: in a value set from outside, or else in the text."""
-        override = next((one for one in reversed(self.overrides) if self._is_cause(one, finding)), None)
+        causes = [one for one in reversed(self.overrides) if self._is_cause(one, finding)]
+        # what set the value itself, before what is only beside it
+        override = max(causes, key=lambda one: finding.path[: len(one.path)] == one.path, default=None)
         if override is None:  # something may be missing in a table that is not in the text but was created from outside
             table = finding.path[:-1]
             created = reversed(self.overrides) if table and table not in self.source.places else ()

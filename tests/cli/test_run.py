@@ -37,6 +37,8 @@ def test_a_scene_that_does_not_settle_is_refused_with_the_key_that_lets_it_fall(
     answer = blocksim("run", "wall.toml", "--set", "ground.tilt=36 deg")
     assert answer.code == 76
     assert answer.err.endswith("; --set start.settle=false runs it from where it is placed\n")
+    held = blocksim("run", "wall.toml", "--set", "ground.tilt=36 deg", "--set", 'start.hold=["1"]')
+    assert held.err.endswith('; --set start.settle=false --set "start.hold=[]" runs it from where it is placed\n')
 
 
 def test_long_table_tells_how_many_blocks_it_leaves_out() -> None:

@@ -119,6 +119,10 @@ class Output(Table):
 Release = Literal["at rest", "always"]
 
 
+NOTHING_HELD = {"hold": "[]", "release": "at rest"}
+"""Values of keys of [start] that say nothing, as on the command line."""
+
+
 class Start(Table):
     """What happens before time zero: nothing, or the blocks settle under gravity and the loads of time zero.
 
@@ -137,11 +141,13 @@ class Start(Table):
     )
 
     def _check(self) -> None:
-        if self.hold and not self.settle:
-            raise q.invalid("nothing is held without settle = true: add it, or leave hold out", "hold")
-        if self.release != "at rest" and not self.settle:
+        given = [name for name, default in NOTHING_HELD.items() if getattr(self, name) not in ((), default)]
+        if given and not self.settle:
+            names = " and ".join(given)
+            without = " ".join(f'--set "start.{name}={NOTHING_HELD[name]}"' for name in given)
             raise q.invalid(
-                "without settle = true nothing waits to be released: add it, or leave release out", "release"
+                f"without settle = true there is no use for {names}: add it, or leave out {names} ({without})",
+                "settle" if "settle" in self.model_fields_set else given[0],
             )
 
 
