@@ -129,14 +129,6 @@ def main() -> None:
 
     try:
         app(obj=began)
-    except SystemExit as ended:
-        frames = sys.modules.get("blocksim.simulation.stores.hdf5")
-        if frames is not None and frames.failures and isinstance(ended.code, int):
-            for stream in (sys.stdout, sys.stderr):
-                with suppress(OSError):
-                    stream.flush()
-            os._exit(ended.code)
-        raise
     except KeyboardInterrupt:
         sys.exit(ExitCode.STOPPED_EARLY)
     except Exception as error:  # noqa: BLE001 - the last line of defence

@@ -5,6 +5,7 @@ types, before the file switches to single-writer-multiple-reader mode, and only 
 is followed by a new value of `n_committed`. HDF5 cannot recover from a write that fails, so space is reserved before.
 """
 
+import ctypes
 import errno
 import io
 import itertools
@@ -380,8 +381,6 @@ def _contacts(path: Path, file: Any, frames: int, bodies: int) -> trajectory.Con
     return trajectory.Contacts(ends, rows)
 
 
-failures: list[Exception] = []
-"""What HDF5 could not write, with its objects: it may crash where one is closed, and as the process ends."""
 FLUSH_SECONDS = 0.25
 APART = 10.0  # times what the last flush took: a tenth of a run at most
 RESERVE = 1 << 18  # bytes
@@ -408,6 +407,8 @@ class FrameFile(AbstractContextManager["FrameFile"]):
             for name, units in ((name, one.units.items()) for name, one in self.probes.series().items())
         }
         self.count = 0
+        # open all the time: one that is closed writes its last chunks, and where that fails HDF5 crashes afterwards
+        self.data_sets: dict[str, h5py.Dataset] = {}
         self.is_broken = self.has_failed = False
         self.waiting: list[instruments.Frame] = []
         self.flushed_at = -np.inf
@@ -440,23 +441,26 @@ class FrameFile(AbstractContextManager["FrameFile"]):
         h5md = self.file.create_group("h5md")
         h5md.attrs["version"] = np.array([1, 1])
         h5md.create_group("creator").attrs["name"] = "blocksim"
-        self.file.create_dataset(COMMITTED, (), dtype=np.int64).attrs["unit"] = "1"
+        self._create_data_set(COMMITTED, "1", shape=(), dtype=np.int64)
         self.file.create_group(OBSERVABLES, track_order=True)  # readers list the energies as the scheme does
         for name, probe in self.probes.series().items():
             group = self.file.create_group(f"{PROBES}/{name}", track_order=True)
             group.attrs["kind"] = probe.kind
-            group.create_dataset(COMMITTED, (), dtype=np.int64).attrs["unit"] = "1"
+            self._create_data_set(f"{PROBES}/{name}/{COMMITTED}", "1", shape=(), dtype=np.int64)
         for one in itertools.chain(self.sets, *self.probe_sets.values()):
             # a scene may have no blocks; a chunk of nothing cannot be
             chunks, most = (one.chunk, *(size or 1 for size in one.row)), (None, *(size or None for size in one.row))
-            data_set = self.file.create_dataset(one.name, (0, *one.row), dtype=one.kind, maxshape=most, chunks=chunks)
-            data_set.attrs["unit"] = one.unit
+            form = {"shape": (0, *one.row), "dtype": one.kind, "maxshape": most, "chunks": chunks}
+            self._create_data_set(one.name, one.unit, **form)
         for present in self.systems:
             for constant, values in present.constants():
-                data_set = self.file.create_dataset(f"{PARTICLES}/{present.system.name}/{constant.name}", data=values)
-                data_set.attrs["unit"] = constant.unit.replace("/s", " s-1")
-        text = self.file.create_dataset(SCENARIO_TEXT, data=np.bytes_(scenario_toml.encode()))
-        text.attrs["unit"] = "TOML"
+                name = f"{PARTICLES}/{present.system.name}/{constant.name}"
+                self._create_data_set(name, constant.unit.replace("/s", " s-1"), data=values)
+        self._create_data_set(SCENARIO_TEXT, "TOML", data=np.bytes_(scenario_toml.encode()))
+
+    def _create_data_set(self, name: str, unit: str, **form: Any) -> None:
+        self.data_sets[name] = self.file.create_dataset(name, **form)
+        self.data_sets[name].attrs["unit"] = unit
 
     def _reserve(self, size: int) -> None:
         """Make sure of the space on the disk, and of what HDF5 adds: after a write that fails it cannot continue."""
@@ -491,7 +495,7 @@ class FrameFile(AbstractContextManager["FrameFile"]):
                     )
                 )
                 for one, values in added:
-                    data_set = self.file[one.name]
+                    data_set = self.data_sets[one.name]
                     count = data_set.shape[0]
                     before = data_set[count - 1] if one.is_sum and count else 0
                     data_set.resize(count + len(values), axis=0)
@@ -500,9 +504,9 @@ class FrameFile(AbstractContextManager["FrameFile"]):
                 self.waiting.clear()
                 self.file.flush()
             for name in samples:
-                group = self.file[f"{PROBES}/{name}"]
-                group[COMMITTED][()] = group[PROBE_STEP].shape[0]
-            self.file[COMMITTED][()] = self.count
+                steps = self.data_sets[f"{PROBES}/{name}/{PROBE_STEP}"]
+                self.data_sets[f"{PROBES}/{name}/{COMMITTED}"][()] = steps.shape[0]
+            self.data_sets[COMMITTED][()] = self.count
             self.file.flush()
         self.flushed_at = time.monotonic()
         self.flush_seconds = self.flushed_at - began
@@ -520,7 +524,8 @@ class FrameFile(AbstractContextManager["FrameFile"]):
             yield
         except (OSError, RuntimeError) as error:
             self.is_broken = self.has_failed = True
-            failures.append(error)
+            # HDF5 may crash where what it could not write is closed, at exit too
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self))
             raise OutputError(f"{self.path}: cannot be written: {_cause(error)}") from error
 
     def __exit__(
