@@ -120,6 +120,32 @@ def test_an_empty_entry_of_the_path_for_modules_gives_a_command_no_package(folde
     assert executed(folder) == []
 
 
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+
+if __name__ == "__main__":
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs=50) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
+
+
+@pytest.mark.long
+def test_a_sweep_on_a_dask_cluster_executes_no_module_of_the_current_folder(folder: Path) -> None:
+    pytest.importorskip("distributed")
+    pipe = subprocess.PIPE
+    command = [sys.executable, "-c", CLUSTER]
+    with subprocess.Popen(command, cwd=folder.parent, stdin=pipe, stdout=pipe, text=True) as cluster:
+        assert cluster.stdout is not None
+        address = cluster.stdout.readline().strip()
+        done = call(folder, START, *COMMANDS_IN_TURN[5][:-4], "--scheduler", address)
+        cluster.communicate()
+    assert done.returncode == 0, done.stderr
+    assert executed(folder) == []
+    assert (folder / "swept" / "sweep.csv").read_text().count("finished") == 2
+
+
 HELPER = "VALUES = [0.3, 0.4]\n"
 STUDY = """
 import helper  # of its own folder
