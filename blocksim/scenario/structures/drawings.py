@@ -28,6 +28,7 @@ MOST_OUTLINES, MOST_CORNERS = 2000, 16_000
 """In a drawing; the scenario that is kept with the results has them all, and a scenario has a megabyte at most."""
 DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
 """What readers raise for a file that is no drawing."""
+DXF_DAMAGE = (AssertionError, RuntimeError, StopIteration)  # what else that of DXF raises, without words in the end
 
 
 class DrawingOutline(NamedTuple):
@@ -92,7 +93,7 @@ def read_drawing(path: Path) -> Drawing:
     """
     is_dxf = path.suffix.lower() == f".{DXF}"
     ezdxf = load_module("ezdxf", f"reading {path.name}", DXF) if is_dxf else None
-    damage = DAMAGE if ezdxf is None else (ezdxf.DXFError, *DAMAGE)
+    damage = DAMAGE if ezdxf is None else (ezdxf.DXFError, *DXF_DAMAGE, *DAMAGE)
     try:
         content = input_files.read_limited(path, MOST_BYTES)  # no file that is larger, no pipe
         found = read_geojson(content) if ezdxf is None else read_dxf(ezdxf.readfile(path))
@@ -102,7 +103,7 @@ def read_drawing(path: Path) -> Drawing:
         raise DrawingError(str(error)) from None
     except damage as error:
         # the package repeats the path, which may be long
-        words = str(error).replace(str(path), path.name)[:100]
+        words = str(error).replace(str(path), path.name)[:100] or "it is cut off"
         raise DrawingError(f"not a {'DXF' if is_dxf else 'GeoJSON'} file: {words}") from None
     outlines = found.outlines
     if len(outlines) == 0:
