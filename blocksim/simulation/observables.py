@@ -28,11 +28,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from blocksim.scenario import PlacedBody, Scenario, motion
 from blocksim.simulation.trajectory import MILLI
@@ -395,6 +396,15 @@ class Movement(BaseModel, frozen=True, extra="allow"):
     def without_outcome(self) -> "Movement":
         """Return those of a run that failed: what it would have come to is not known."""
         return type(self)(**{**self.values, OUTCOME: None})
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Refuse what people are told of a run where it is not there, or is no number."""
+        wrong = [name for name in (OUTCOME, FIRST_MOVER, FIRST_MOVED, "fastest_m_s") if name not in self.values]
+        wrong += [one.name for one in OBSERVABLES.values() if one.unit and isinstance(self.values.get(one.name), str)]
+        if wrong:
+            raise PydanticCustomError("movement", "{name} is missing, or is no number", {"name": wrong[0]})
+        return self
 
     @property
     def values(self) -> dict[str, Value]:

@@ -379,8 +379,8 @@ class _Settlement:
         is_free = np.zeros(later.x.size, bool)
         is_free[: self.count] = self.is_free
         for one, other in overlap.near_pairs(later):
-            moved = is_free[one] | is_free[other]
-            a, b = one[moved], other[moved]
+            chosen = is_free[one] | is_free[other]
+            a, b = one[chosen], other[chosen]
             before = np.maximum(overlap.penetration(now.some(a), now.some(b)), 0.0)
             if (overlap.penetration(later.some(a), later.some(b)) - before > most).any():
                 return True

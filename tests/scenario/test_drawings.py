@@ -92,6 +92,17 @@ def test_dxf_without_its_package_names_the_extra(tmp_path: Path, monkeypatch: py
         read_drawing(written(tmp_path, "", "wall.dxf"))
 
 
+HEADER_UTF8 = b"0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1027\n0\nENDSEC\n"
+
+
+def test_bytes_of_a_dxf_file_that_are_no_characters_are_told_as_numbers(tmp_path: Path) -> None:
+    pytest.importorskip("ezdxf")
+    path = tmp_path / "wall.dxf"
+    path.write_bytes(HEADER_UTF8 + b"0\nSECTION\n2\nENTITIES\n \xa8x\nLWPOLYLINE\n0\nENDSEC\n0\nEOF\n")
+    with pytest.raises(DrawingError, match=r"udca8x"):
+        read_drawing(path)
+
+
 def test_settings_in_the_current_folder_do_not_reach_the_reader_of_dxf(tmp_path: Path) -> None:
     (tmp_path / "ezdxf.ini").write_text("[core]\nlog_unprocessed_tags = true\n")
     code = (

@@ -51,6 +51,10 @@ class Drawing(NamedTuple):
 class DrawingError(ValueError):
     """A drawing that cannot be read, or an outline in it that no block can have; the text says which."""
 
+    def __init__(self, text: str) -> None:
+        """Take the text; bytes of names that are no characters are written as numbers."""
+        super().__init__(text.encode(errors="backslashreplace").decode())
+
 
 def place_text(x: float, y: float) -> str:
     """Return a place with all digits that matter."""
