@@ -11,8 +11,7 @@ something is predicted from gap s, approach u and the pull p of gravity,
 an interval ends just before it, one of FINE of a step follows, then it is predicted again. An interval has as many
 substeps as a step. The springs of the position pass keep their stiffness in seconds, so that what is at rest does not
 move when the length changes, and impulses that a substep begins with go with it. Velocities live half a substep behind
-and are shifted with its length: by gravity in flight, by their own change where something holds a body. Loads are not
-shifted with it, which leaves an error of second order in the step at every cut.
+and are shifted with its length: by gravity and loads in flight, by their own change where something holds a body.
 """
 
 import math
@@ -88,9 +87,9 @@ def set_length(scene: arrays.Nonsmooth, length: float) -> None:
 def shift_velocities(scene: arrays.Nonsmooth, h: float) -> None:
     """Bring velocities from half of the last substep behind to half of the next, h (s), by what the last one changed.
 
-    In flight that is gravity, of what something holds it is what the last substep has left of it (`held_change`).
-    The ledger (energy.py) counts with velocities half a substep on, and with the displacements that velocities alone
-    would give.
+    In flight that is gravity and loads, of what something holds it is what the last substep has left of them
+    (`held_change`). The ledger (energy.py) counts with velocities half a substep on, and with the displacements that
+    velocities alone would give; what loads bring a body so is their work.
     """
     controls = scene.world.controls[0]
     stepping = scene.contacts.stepping[0]
@@ -110,8 +109,14 @@ def shift_velocities(scene: arrays.Nonsmooth, h: float) -> None:
             before = scene.contacts.before[i]
             share = behind * (old - h)
             ax, ay, turn = controls.gravity_x, controls.gravity_y, 0.0
+            if scene.pushes.size > 1:
+                ax += scene.pushes[i].ax
+                ay += scene.pushes[i].ay
+                turn = scene.pushes[i].rate
             if scene.used[i]:
-                ax, ay, turn = held_change(state, before, stepping.last_substep, controls)
+                ax, ay, turn = held_change(state, before, stepping.last_substep, ax * ax + ay * ay)
+            elif scene.pushes.size > 1:
+                tally_shift(scene, i, share, behind * h)
             vx = state.vx + share * ax
             vy = state.vy + share * ay
             spin = state.spin + share * turn
@@ -130,20 +135,34 @@ def shift_velocities(scene: arrays.Nonsmooth, h: float) -> None:
 
 
 @rare_kernel
-def held_change(state: Record, before: Record, h: float, controls: Record) -> tuple[float, float, float]:
+def tally_shift(scene: arrays.Nonsmooth, i: int, share: float, ahead: float) -> None:
+    """Tally what loads bring a body in flight that is shifted by a time `share` (s), at velocities `ahead` (s) on."""
+    controls, body = scene.world.controls[0], scene.world.bodies[i]
+    state, one = scene.contacts.states[i], scene.pushes[i]
+    vx = state.vx + share * controls.gravity_x
+    vy = state.vy + share * controls.gravity_y
+    gain = kinetic_ahead(vx + share * one.ax, vy + share * one.ay, ahead, controls) - kinetic_ahead(
+        vx, vy, ahead, controls
+    )
+    spin = state.spin + share * one.rate
+    one.work += body.mass * gain + 0.5 * body.inertia * (spin * spin - state.spin * state.spin)
+    scene.contacts.before[i].lifted += gain + 0.5 * (spin * spin - state.spin * state.spin) * body.inertia / body.mass
+
+
+@rare_kernel
+def held_change(state: Record, before: Record, h: float, free: float) -> tuple[float, float, float]:
     """Return the accelerations (m/s2, m/s2, rad/s2) of a body that something holds, from its last substep h (s).
 
     One that rolls about a corner speeds up until the other meets the ground, and strikes it too slowly with the
-    velocity of half a substep ago. Contacts that do no work take a part of the acceleration of gravity away, so that
-    the rest, measured by its kinetic energy, is no more than gravity; where it is, the change was none of motion alone
-    but, say, a contact that closed, and nothing is known of the acceleration.
+    velocity of half a substep ago. Contacts that do no work take a part of the acceleration of gravity and loads away,
+    so that the rest, measured by its kinetic energy, is no more than theirs, squared `free` (m2/s4); where it is, the
+    change was none of motion alone but, say, a contact that closed, and nothing is known of the acceleration.
     """
     ax = (state.vx - before.vx) / h
     ay = (state.vy - before.vy) / h
     turn = (state.spin - before.spin) / h
     size = ax * ax + ay * ay + turn * turn * state.inverse_mass / state.inverse_inertia
-    gravity = controls.gravity_x * controls.gravity_x + controls.gravity_y * controls.gravity_y
-    if size > MOST_RESTRAINT * gravity:
+    if size > MOST_RESTRAINT * free:
         return 0.0, 0.0, 0.0
     return ax, ay, turn
 

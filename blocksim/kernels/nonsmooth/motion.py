@@ -238,8 +238,13 @@ def kick_again(contacts: arrays.Contacts, pushes: Records, first: int, last: int
 
 @jit.rare_kernel
 def tally_loads(scene: arrays.Nonsmooth, first: int, last: int, share: float) -> None:
-    """Tally what loads have brought the bodies from `first` to before `last` in a substep with that share of a kick."""
-    half = 0.5 * share * scene.contacts.stepping[0].substep
+    """Tally what loads have brought the bodies from `first` to before `last` in a substep with that share of a kick.
+
+    The first of a run has half a kick, and its velocities are those of time zero: so it lacks half of that of gravity.
+    """
+    stepping = scene.contacts.stepping[0]
+    half = 0.5 * share * stepping.substep
+    lack_x, lack_y = (share - 1.0) * stepping.fall_x, (share - 1.0) * stepping.fall_y
     loads.tally_actuators(scene.world, scene.contacts.states, scene.contacts.before, first, last, half)
     for i in range(first, last):
         state = scene.contacts.states[i]
@@ -247,7 +252,7 @@ def tally_loads(scene: arrays.Nonsmooth, first: int, last: int, share: float) ->
             body = scene.world.bodies[i]
             before = scene.contacts.before[i]
             one = scene.pushes[i]
-            along = one.ax * (before.vx + state.vx) + one.ay * (before.vy + state.vy)
+            along = one.ax * (before.vx + state.vx + lack_x) + one.ay * (before.vy + state.vy + lack_y)
             turning = one.rate * (before.spin + state.spin)
             one.work += half * (body.mass * along + body.inertia * turning)
 
