@@ -13,7 +13,8 @@ from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.world import build, memory, rigid_step, sag, step
 from blocksim.world.bodies import Layout
 
-MOST_REACH = 1.5  # of a body, in skins
+MOST_REACH = 2.0  # of a body, in skins
+ROOM = 2  # of the room for pairs of springs: fast bodies have more within reach
 FINEST, FINE, COARSE = 1e-6, 1e-3, 0.1  # m/s: tolerances of the velocity pass; see velocity_tolerance
 CROWD = 100  # blocks
 TOUCH = 1e-12  # of the smallest side: points with no larger gap touch
@@ -68,12 +69,16 @@ def _assemble(parts: build.Parts, strides: Sequence[step.Stride]) -> arrays.Nons
     for name in rows[0]:
         stepping[name][:, 0] = [row[name] for row in rows]
     controls["cell_width"] = 2.0 * (controls["cell_radius"] + stepping["most_reach"])
-    return with_lists(build.assemble_world(parts, controls), stepping, build.first_capacity(parts.bodies.shape[1]))
+    return with_lists(build.assemble_world(parts, controls), stepping, _room(parts))
+
+
+def _room(parts: build.Parts) -> int:
+    return ROOM * build.first_capacity(parts.bodies.shape[1])
 
 
 NONSMOOTH = build.Construction(
     choose=rigid_step.choose_rigid_stride,
-    size=lambda parts: memory.rigid_size(parts.bodies.shape[1], build.first_capacity(parts.bodies.shape[1])),
+    size=lambda parts: memory.rigid_size(parts.bodies.shape[1], _room(parts)),
     assemble=_assemble,
 )
 
@@ -143,7 +148,7 @@ def with_more_constraints(scene: arrays.Nonsmooth) -> arrays.Nonsmooth:
     for name in ("constraints", "tallies"):
         getattr(larger.contacts, name)[: getattr(old, name).size] = getattr(old, name)
     contacts = larger.contacts._replace(states=old.states, before=old.before, ends=old.ends, residuals=old.residuals)
-    return larger._replace(contacts=contacts, reaches=scene.reaches, begins=scene.begins, pushes=scene.pushes)
+    return scene._replace(world=larger.world, contacts=contacts, kept=larger.kept)
 
 
 def with_more_threads(scene: arrays.Nonsmooth, threads: int) -> arrays.Nonsmooth:

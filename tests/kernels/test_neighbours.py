@@ -20,7 +20,7 @@ from blocksim.kernels.common.arrays import (
     zeros,
 )
 from blocksim.kernels.common.mechanics import renew_rotations
-from blocksim.kernels.common.neighbours import CellGrid, lay_cells, list_pairs, sort_into_cells, travel
+from blocksim.kernels.common.neighbours import CellGrid, Stale, lay_cells, list_pairs, sort_into_cells, travel
 from blocksim.kernels.common.shapes import separation, turn
 from blocksim.kernels.common.tolerances import MOST_UNSEEN, SMALL_TURN
 from blocksim.kernels.explicit.broad_phase import PAIR_SHARE, carry_history, unseen_steps
@@ -169,15 +169,21 @@ def expected_neighbours(world: World) -> list[list[int]]:
 
 
 def found_neighbours(world: World) -> list[list[int]]:
-    """Return the same from the list of pairs, sorted or not, without the ground."""
+    """Return the same from the list of pairs, made at once or of two halves of the bodies, without the ground."""
     ground, reach = world.bodies.size - 1, float(world.controls[0].skin)
     kept: Any = zeros(ground * ground, PAIR)
     found: list[list[int]] = [[] for _ in range(ground)]
-    for a, b in kept[: list_pairs(world, kept, None, reach, True)][["a", "b"]].tolist():
+    for a, b in kept[: list_pairs(world, kept, None, reach)][["a", "b"]].tolist():
         if b < ground:
             found[a].append(b)
-    others = kept[: list_pairs(world, kept, 0.5 * np.full(ground + 1, reach), 0.0, False)][["a", "b"]].tolist()
-    assert sorted(pair for pair in others if pair[1] < ground) == [(a, b) for a in range(ground) for b in found[a]]
+    others: list[tuple[int, int]] = []
+    marks = np.arange(ground + 1) % 2
+    for half in (marks, 1 - marks):
+        stale = Stale(half, 0.5 * np.full(ground + 1, reach))
+        others += kept[: list_pairs(world, kept, stale, 0.0)][["a", "b"]].tolist()
+    mixed = [(a, b) for a, b in others if b < ground and a % 2 != b % 2]
+    assert len(mixed) == 2 * len(set(mixed))  # from both halves
+    assert sorted({pair for pair in others if pair[1] < ground}) == [(a, b) for a in range(ground) for b in found[a]]
     return found
 
 

@@ -96,7 +96,7 @@ def test_a_batch_of_everything_has_the_bits_of_runs_of_their_own() -> None:
 @pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
 def test_a_pair_list_that_fills_up_on_the_way_changes_no_bit(scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scenarios = [pushed_wall(4, 5, contact=WALL, time={"scheme": scheme, "end": end}) for end in (0.05, 0.06)]
-    monkeypatch.setattr(build, "PAIRS_PER_BODY", 2)
+    monkeypatch.setattr(build, "PAIRS_PER_BODY", 1)
     ends = run_ensemble(scenarios)
     monkeypatch.undo()
     for end, scenario in zip(ends, scenarios, strict=True):

@@ -81,6 +81,7 @@ def test_resumed_run_has_the_bits_of_a_continuous_one(tmp_path: Path, name: str,
 def test_lists_that_have_grown_come_back_as_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.setattr("blocksim.world.build.LEAST_PAIRS", 1)
     monkeypatch.setattr("blocksim.world.build.PAIRS_PER_BODY", 0)
+    monkeypatch.setattr("blocksim.world.nonsmooth.ROOM", 1)
     scenario = sliding(MODELS[name], end=0.01)
     whole = simulate_into(scenario, tmp_path / "whole")
     interrupted_at(scenario, tmp_path / "parts", [whole.summary.steps // 2])

@@ -163,17 +163,22 @@ def note_places(bodies: arrays.Records) -> None:
         body.list_angle = body.angle
 
 
+class Stale(NamedTuple):
+    """Which pairs are listed where not all are: those with a marked body, and how far each body reaches (m)."""
+
+    marks: arrays.Integers  # (n + 1,)
+    reaches: arrays.Floats  # (n + 1,) m
+
+
 @jit.rare_kernel
-def add_if_near(
-    world: arrays.World, pairs: Any, reaches: arrays.Floats | None, reach: float, i: int, j: int, count: int
-) -> int:
+def add_if_near(world: arrays.World, pairs: Any, stale: Stale | None, reach: float, i: int, j: int, count: int) -> int:
     """List two bodies, at least one of them free, if they are near and there is room; return the count needed.
 
-    Near means a gap (m) of no more than `reach`, or than what the `reaches` of both, if there are any, add up to.
+    Near means a gap (m) of no more than `reach`, or than what the reaches of both add up to.
     """
     body, other = world.bodies[i], world.bodies[j]
-    if reaches is not None:
-        reach = reaches[i] + reaches[j]
+    if stale is not None:
+        reach = stale.reaches[i] + stale.reaches[j]
     if j == world.bodies.size - 1:
         is_near = body.inverse_mass > 0.0 and shapes.ground_gap(body) <= other.y + reach
     else:
@@ -191,35 +196,47 @@ def add_if_near(
 def add_from_cell(
     world: arrays.World,
     pairs: Any,
-    reaches: arrays.Floats | None,
+    stale: Stale | None,
     reach: float,
     i: int,
     grid: CellGrid,
     cell: tuple[int, int],
-    least: int,
     count: int,
 ) -> int:
-    """List body i with what is near it in a cell (column, row), from number `least` on; return the count needed."""
+    """List body i with what is near it in a cell (column, row); return the count needed."""
     column, row = cell
     number = endless_number(grid, column, row)
     for k in range(world.starts[number], world.starts[number + 1]):
         j = world.order[k]
         other = world.bodies[j]
-        if j >= least and other.radius <= world.controls[0].cell_radius:
-            more = add_if_near(world, pairs, reaches, reach, i, j, count)
+        if is_listed_from(stale, i, j) and other.radius <= world.controls[0].cell_radius:
+            more = add_if_near(world, pairs, stale, reach, i, j, count)
             # the cell may share its number with others
             if more > count and cell_along(other.x, grid.x, grid.size) == column:
                 count += int(cell_along(other.y, grid.y, grid.size) == row)
     return count
 
 
+@jit.kernel
+def is_asked(stale: Stale | None, i: int) -> bool:
+    """Return True if pairs of a body are sought."""
+    if stale is None:
+        return True
+    return stale.marks[i] > 0
+
+
+@jit.kernel
+def is_listed_from(stale: Stale | None, i: int, j: int) -> bool:
+    """Return True if a pair is sought from body i, not from body j."""
+    return j > i or (j != i and not is_asked(stale, j))
+
+
 @jit.rare_kernel
-def list_pairs(world: arrays.World, pairs: Any, reaches: arrays.Floats | None, reach: float, is_sorted: bool) -> int:
+def list_pairs(world: arrays.World, pairs: Any, stale: Stale | None, reach: float) -> int:
     """List all pairs of bodies that are near one another; return how many there are, fitting or not.
 
-    Bodies too large for the cells, and the ground, are tested one by one. Sorted by both bodies, each pair is found
-    from the first of them, in the cells all around it. Else each two neighbouring cells are visited from one of them
-    only: from the left one, or the lower one.
+    Each pair is found from one body, in the cells all around it: from the first, or from the only one that is marked.
+    Pairs found from one body are sorted. Bodies too large for the cells, and the ground, are tested one by one.
     """
     controls, bodies, starts = world.controls[0], world.bodies, world.starts
     ground = bodies.size - 1
@@ -228,35 +245,36 @@ def list_pairs(world: arrays.World, pairs: Any, reaches: arrays.Floats | None, r
     sort_into_cells(blocks, grid, starts, world.order)
     count = 0
     for i in range(ground):
+        if not is_asked(stale, i):
+            continue
         body = bodies[i]
-        is_large = body.radius > controls.cell_radius
         first_pair = count
-        if is_large and is_sorted:
-            for j in range(i + 1, ground):
-                count = add_if_near(world, pairs, reaches, reach, i, j, count)
-        if not is_large:
+        if body.radius > controls.cell_radius:
+            for j in range(ground):
+                if is_listed_from(stale, i, j):
+                    count = add_if_near(world, pairs, stale, reach, i, j, count)
+        else:
             own_column, own_row = cell_along(body.x, 0.0, grid.size), cell_along(body.y, 0.0, grid.size)
-            for row in range(own_row - 1 if is_sorted else own_row, own_row + 2):
-                for column in range(own_column - 1 if is_sorted or row > own_row else own_column, own_column + 2):
-                    least = i + 1 if is_sorted or (row == own_row and column == own_column) else 0
-                    count = add_from_cell(world, pairs, reaches, reach, i, grid, (column, row), least, count)
-        if not (is_large and is_sorted):
+            for row in range(own_row - 1, own_row + 2):
+                for column in range(own_column - 1, own_column + 2):
+                    count = add_from_cell(world, pairs, stale, reach, i, grid, (column, row), count)
             for j in world.large:
-                if j > i or (not is_sorted and not is_large):
-                    count = add_if_near(world, pairs, reaches, reach, i, j, count)
-        if is_sorted:
-            sort_by_second(pairs, first_pair, min(count, pairs.size))
-        count = add_if_near(world, pairs, reaches, reach, i, ground, count)
+                if is_listed_from(stale, i, j):
+                    count = add_if_near(world, pairs, stale, reach, i, j, count)
+        sort_pairs(pairs, first_pair, min(count, pairs.size))
+        count = add_if_near(world, pairs, stale, reach, i, ground, count)
     return count
 
 
 @jit.rare_kernel
-def sort_by_second(pairs: Any, begin: int, end: int) -> None:
-    """Sort a few pairs of the same first body by the second one."""
+def sort_pairs(pairs: Any, begin: int, end: int) -> None:
+    """Sort a few pairs by both bodies."""
     for m in range(begin + 1, end):
-        b = pairs[m].b
+        a, b = pairs[m].a, pairs[m].b
         k = m
-        while k > begin and pairs[k - 1].b > b:
+        while k > begin and (pairs[k - 1].a > a or (pairs[k - 1].a == a and pairs[k - 1].b > b)):
+            pairs[k].a = pairs[k - 1].a
             pairs[k].b = pairs[k - 1].b
             k -= 1
+        pairs[k].a = a
         pairs[k].b = b

@@ -188,7 +188,9 @@ FACING = -0.01  # calibrated | cosine of an angle
 # x10 and /10: test_block_that_reaches_beyond_both_ends_of_a_segment_meets_it_as_faces_while_they_are_parallel
 PARALLEL_COSINE = -0.99995  # calibrated | cosine of an angle
 # Steps that a body should be able to continue before its reach is used up.
-REACH_STEPS = 16.0  # cost | steps
+REACH_STEPS = 20.0  # cost | steps
+# From one step in which lists that would not last as long are made anew to the next such step.
+LIST_STEPS = 8  # cost | steps
 # Way that a body may go in a step without a look at the list.
 MOST_MARGIN = 0.5  # cost | least reach of two bodies
 

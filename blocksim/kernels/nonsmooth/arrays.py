@@ -96,8 +96,9 @@ IMPACT_LANES = on_own_lines(
 )
 KEPT = record_type(
     "nx ny normal_one normal_two shear",  # of a constraint whose pair is in the next list too
-    # bodies of a listed pair, its colour; the next old one with the same body a, from 1; likewise in flush_joints.py
-    indices="a b colour next next_of_b",
+    # bodies of a listed pair, its colour; the next old one with the same body a, from 1; likewise in flush_joints.py,
+    # and which constraints are undecided, from the first place on
+    indices="a b colour next next_of_b undecided",
     flags="corner_one corner_two is_struck",
 )
 STEPPING = record_type(
@@ -111,7 +112,6 @@ STEPPING = record_type(
     "margin "  # m: points with a larger gap are left out of the current step
     "support_vx support_vy "  # m/s: of the ground and all that is fixed, in the current substep
     "support_x support_y "  # m: how far they have come
-    "listed_x listed_y "  # m: how far they had come when the pair list was made
     "fall_x fall_y "  # m/s: what a substep of gravity adds to velocities
     "pull_x pull_y "  # m/s: the same of gravity and of loads that act on all bodies
     "lag "  # -: of a substep of gravity, what velocities lack when the current substep begins
@@ -179,7 +179,7 @@ class Nonsmooth(NamedTuple):
     contacts: Contacts
     kept: Records  # (p,) KEPT, work space of a new pair list and of flush joints
     reaches: Floats  # (n + 1,) m: how far beyond each body its neighbours were sought; of the ground zero
-    firsts: Integers  # (n + 1,) likewise: the first old constraint of a body a, from 1; 0 where there is none
+    firsts: Integers  # (n + 1,) work space: marks; the first old constraint of a body a, from 1; 0 where there is none
     begins: Integers  # (COLOURS + 1,) where every colour begins among the constraints
     used: Integers  # (n + 1,) work space: bits of the colours that a body's pairs have
     pushes: Records  # (n + 1,) PUSH; one of no use without loads

@@ -1,12 +1,13 @@
 """The pair list: when it has to be rebuilt, and what is in it.
 
-Every body looks for neighbours within its reach: farther where it is faster, so that a few that fly do not have the
-whole list rebuilt at every step. A pair is listed where two reaches meet, and the list is good until a body has
-used up its own, less what it may move in the next step.
+Every body looks for neighbours within its reach, farther where it is faster. A pair is listed where two reaches meet,
+and is good until one of its bodies has used up its own, less what it may move in the next step. Travel is measured
+against the supports, which are at rest or move together.
 
-Bodies that all move alike come no nearer to each other, and over level ground only their descent counts. So travel is
-measured against the mean motion along x, unless something fixed stands in its way: then against that of the supports,
-which are at rest or move together.
+Bodies are listed anew one by one, when their own reach is used up: so what is listed of them, when and in which order,
+follows from them and their neighbours alone, and what is out of reach changes no bit of their motion. Where each had
+its own time, there would be some of them in every step. So in one of LIST_STEPS steps those are listed anew whose reach
+would not last until the next of these steps.
 
 The constraints of a new pair list: colours, and impulses carried over.
 
@@ -19,7 +20,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.common import arrays, jit, neighbours, supports
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.common.tolerances import MOST_MARGIN, REACH_STEPS
+from blocksim.kernels.common.tolerances import LIST_STEPS, MOST_MARGIN, REACH_STEPS
 from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, KEPT, Nonsmooth
 from blocksim.kernels.nonsmooth.packs import LONELY
 
@@ -106,7 +107,7 @@ def most_packs(scene: Nonsmooth) -> int:
 
 
 class Frame(NamedTuple):
-    """Motion that brings no two bodies nearer: displacement since the list was built (m), and velocity (m/s)."""
+    """The motion of the supports: displacement since the run began (m), and velocity (m/s)."""
 
     x: float
     y: float
@@ -118,96 +119,113 @@ class Frame(NamedTuple):
 def frame_of_supports(scene: Nonsmooth) -> Frame:
     """Return the motion of the supports."""
     one = scene.contacts.stepping[0]
-    return Frame(one.support_x - one.listed_x, one.support_y - one.listed_y, one.support_vx, one.support_vy)
+    return Frame(one.support_x, one.support_y, one.support_vx, one.support_vy)
 
 
 @jit.kernel
-def common_frame(scene: Nonsmooth) -> Frame:
-    """Return the mean motion of the bodies along x, or that of the supports where anything but the ground is fixed."""
-    bodies = scene.world.bodies
-    way = 0.0
-    speed = 0.0
-    if supports.has_motion(scene.world.controls[0]):
-        return frame_of_supports(scene)
-    for i in range(bodies.size - 1):
-        body = bodies[i]
-        if body.inverse_mass == 0.0:
-            return frame_of_supports(scene)
-        way += body.x - body.list_x
-        speed += body.vx
-    count = max(1, bodies.size - 1)
-    return Frame(way / count, 0.0, speed / count, 0.0)
+def most_fall(scene: Nonsmooth) -> float:
+    """Return an upper bound (m/s) of what gravity and loads add to velocities in two steps."""
+    controls = scene.world.controls[0]
+    return 2.0 * controls.step * (math.sqrt(controls.gravity_x**2 + controls.gravity_y**2) + controls.push)
+
+
+@jit.kernel
+def uses_up_reach(scene: Nonsmooth, i: int, frame: Frame, speed: float, falls: float) -> bool:
+    """Return True if a body is to be listed anew that has a speed (m/s) in a frame, and gains `falls` (m/s)."""
+    step, reach = scene.world.controls[0].step, scene.reaches[i]
+    gone = neighbours.travel(scene.world.bodies[i], frame.x, frame.y)
+    is_early = scene.world.clock[0].steps % LIST_STEPS == 0
+    way = min(2.0 * step * (speed + falls), MOST_MARGIN * reach)
+    if is_early:  # with the mean speed until the next such step
+        way = (LIST_STEPS + 2.0) * step * (speed + 0.25 * LIST_STEPS * falls)
+    return not gone + way <= reach
 
 
 @jit.rare_kernel
-def update_driven(scene: Nonsmooth, frame: Frame) -> tuple[float, bool]:
-    """Return the speed (m/s) of the fastest driven body in the next step, and whether none uses up its reach.
+def rate_of_driven(scene: Nonsmooth, number: int, frame: Frame) -> float:
+    """Return an upper bound (m/s) of the mean speed of the points of a driven body in the next step, in a frame.
 
-    It is an upper bound of the mean speed of its points in a frame. A path may begin, end or turn back at once: the
-    velocity until now does not show it.
+    A path may begin, end or turn back at once: the velocity until now does not show it.
     """
     world = scene.world
     step = world.controls[0].step
-    fastest = 0.0
-    is_good = True
-    for one in world.moved:
-        if supports.is_driven(one):
-            body = world.bodies[one.body]
-            way = supports.way_over(world, one, world.clock[0].steps * step, step)
-            rate = math.sqrt((way.x / step - frame.vx) ** 2 + (way.y / step - frame.vy) ** 2)
-            rate += body.radius * abs(way.angle) / step
-            reach = scene.reaches[one.body]
-            fastest = max(fastest, rate)
-            gone = neighbours.travel(body, frame.x, frame.y)
-            is_good = is_good and gone + min(rate * step, MOST_MARGIN * reach) <= reach
-    return fastest, is_good
+    one = world.moved[number]
+    way = supports.way_over(world, one, world.clock[0].steps * step, step)
+    rate = math.sqrt((way.x / step - frame.vx) ** 2 + (way.y / step - frame.vy) ** 2)
+    return rate + world.bodies[one.body].radius * abs(way.angle) / step
 
 
 @jit.kernel
 def update_pairs(scene: Nonsmooth) -> bool:
-    """Set the margin of the next step, and rebuild the pair list if bodies have come too far.
+    """Set the margin of the next step, and rebuild the pair list of bodies that have come too far.
 
     Returns False where the list does not fit into its arrays; nothing has changed then.
     """
-    world = scene.world
+    world, marks = scene.world, scene.firsts
     controls = world.controls[0]
     stepping = scene.contacts.stepping[0]
-    frame = common_frame(scene)
-    falls = 2.0 * controls.step * (math.sqrt(controls.gravity_x**2 + controls.gravity_y**2) + controls.push)
+    frame = frame_of_supports(scene)
+    falls = most_fall(scene)
+    is_new = world.clock[0].rebuilds == 0
     fastest = 0.0
-    is_good = world.clock[0].rebuilds > 0
     is_finite = True
+    count = 0
     for i in range(world.bodies.size - 1):
         body = world.bodies[i]
-        reach = scene.reaches[i]
-        rate = neighbours.top_speed(body, frame.vx, frame.vy) + falls
-        fastest = max(fastest, rate)
-        gone = neighbours.travel(body, frame.x, frame.y)
-        is_finite = is_finite and math.isfinite(rate + gone)
-        is_good = is_good and gone + min(2.0 * rate * controls.step, MOST_MARGIN * reach) <= reach
+        speed = neighbours.top_speed(body, frame.vx, frame.vy)
+        is_finite = is_finite and math.isfinite(speed + body.x + body.y)
+        fastest = max(fastest, speed + falls)
+        marks[i] = 1 if is_new or uses_up_reach(scene, i, frame, speed, falls) else 0
+        count += marks[i]
+    marks[world.bodies.size - 1] = 0
     if controls.driven != 0:
-        coming, stays = update_driven(scene, frame)
-        fastest = max(fastest, coming)
-        is_good = is_good and stays
+        for number in range(world.moved.size):
+            if supports.is_driven(world.moved[number]):
+                i = world.moved[number].body
+                rate = rate_of_driven(scene, number, frame)
+                fastest = max(fastest, rate)
+                if uses_up_reach(scene, i, frame, rate, 0.0):
+                    marks[i] = 1
+                    count += 1
     stepping.margin = min(2.0 * controls.step * fastest, 2.0 * MOST_MARGIN * stepping.least_reach)
-    return is_good or not is_finite or rebuild(scene, frame)  # what is not finite is found after the step
+    # what is not finite is found after the step
+    return count == 0 or not is_finite or rebuild(scene, frame)
+
+
+@jit.rare_kernel
+def keep_fresh(scene: Nonsmooth, count: int) -> int:
+    """Add listed pairs without a marked body to `count` pairs that are listed anew, if there is room for them.
+
+    They keep their order, but that those with a lower colour come first. Returns the count needed.
+    """
+    constraints, kept, marks = scene.contacts.constraints, scene.kept, scene.firsts
+    for r in range(scene.contacts.stepping[0].constraint_count):
+        if marks[constraints[r].a] + marks[constraints[r].b] == 0:
+            if count < kept.size:
+                kept[count].a = constraints[r].a
+                kept[count].b = constraints[r].b
+            count += 1
+    return count
 
 
 @jit.rare_kernel
 def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
-    """Rebuild the pair list and its constraints, sorted by colour; how far a body reaches follows from its speed.
+    """Rebuild the pair list of marked bodies, which reach as far as they are fast, and all constraints.
 
     Returns False, with the constraints untouched, where the list does not fit.
     """
     world, contacts = scene.world, scene.contacts
     stepping = contacts.stepping[0]
-    neighbours.note_places(world.bodies)
-    stepping.listed_x = stepping.support_x
-    stepping.listed_y = stepping.support_y
     for i in range(world.bodies.size - 1):
-        ahead = REACH_STEPS * world.controls[0].step * neighbours.top_speed(world.bodies[i], frame.vx, frame.vy)
-        scene.reaches[i] = min(max(ahead, stepping.least_reach), stepping.most_reach)
-    count = neighbours.list_pairs(world, scene.kept, scene.reaches, 0.0, False)
+        if scene.firsts[i] > 0:
+            body = world.bodies[i]
+            body.list_x = body.x - frame.x
+            body.list_y = body.y - frame.y
+            body.list_angle = body.angle
+            ahead = REACH_STEPS * world.controls[0].step * neighbours.top_speed(body, frame.vx, frame.vy)
+            scene.reaches[i] = min(max(ahead, stepping.least_reach), stepping.most_reach)
+    stale = neighbours.Stale(scene.firsts, scene.reaches)
+    count = keep_fresh(scene, neighbours.list_pairs(world, scene.kept, stale, 0.0))
     fits = count <= scene.kept.size
     if fits:
         keep_impulses(scene, count)
