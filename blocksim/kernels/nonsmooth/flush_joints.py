@@ -6,7 +6,8 @@ stops the block. A pair alone cannot tell that from a block that meets a low ste
 
 So, where a corner of one body is near a corner of the other, every face of both is a candidate beyond which they
 overlap by no more than contacts of these bodies do anyhow: `SAG` times the deepest overlap of what presses them, and
-`UNEVEN` of the smaller inner radius, as neighbours sink unequally. Deeper overlaps say nothing about neighbours.
+`UNEVEN` of the smaller inner radius, as neighbours sink unequally. Deeper overlaps say nothing about neighbours: where
+there is but one face that they overlap by less than `NEAR_CORNER`, the pair is decided at once.
 
     which candidates have a normal that presses one of the bodies, by whichever contact      the pair meets at
     not the least overlap, but another                                                        that other one
@@ -28,7 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from blocksim.kernels.common import jit
-from blocksim.kernels.common.arrays import TEAM_SIZE
+from blocksim.kernels.common.arrays import TEAM_SIZE, Integers, Records
 from blocksim.kernels.common.tolerances import PARALLEL_COSINE, SAG, UNEVEN
 from blocksim.kernels.nonsmooth import arrays, faces, manifold, narrow_phase, references, slip
 
@@ -43,36 +44,53 @@ class Candidate(NamedTuple):
     ny: float
 
 
+class Pressed(NamedTuple):
+    """What presses the free bodies of undecided pairs, and no more: each array is passed as several numbers."""
+
+    constraints: Records
+    kept: Records  # the next in the lists of both bodies
+    firsts: Integers  # the first of each body, from 1
+
+
 @jit.rare_kernel
-def is_pressed_along(scene: arrays.Nonsmooth, r: int, nx: float, ny: float) -> bool:
+def is_pressed_along(pressed: Pressed, r: int, nx: float, ny: float) -> bool:
     """Return True if body a of constraint r is pressed along a normal, or body b against it."""
-    constraints = scene.contacts.constraints
+    constraints, kept = pressed.constraints, pressed.kept
     for is_a in (True, False):
         i = constraints[r].a if is_a else constraints[r].b
-        place = scene.firsts[i]
+        place = pressed.firsts[i]
         while place > 0:
             one = constraints[place - 1]
             cosine = one.nx * nx + one.ny * ny
             if (cosine if (one.a == i) == is_a else -cosine) > -PARALLEL_COSINE:
                 return True
-            place = np.int64(scene.kept[place - 1].next if one.a == i else scene.kept[place - 1].next_of_b)
+            place = np.int64(kept[place - 1].next if one.a == i else kept[place - 1].next_of_b)
     return False
 
 
 @jit.rare_kernel
-def deepest_at(scene: arrays.Nonsmooth, i: int) -> float:
+def deepest_at(pressed: Pressed, i: int) -> float:
     """Return the deepest overlap (m) of what presses a body; zero where nothing does."""
     deepest = 0.0
-    place = scene.firsts[i]
+    place = pressed.firsts[i]
     while place > 0:
-        one = scene.contacts.constraints[place - 1]
+        one = pressed.constraints[place - 1]
         deepest = max(deepest, -min(one.gap_one, one.gap_two))
-        place = np.int64(scene.kept[place - 1].next if one.a == i else scene.kept[place - 1].next_of_b)
+        place = np.int64(pressed.kept[place - 1].next if one.a == i else pressed.kept[place - 1].next_of_b)
     return deepest
 
 
-@jit.rare_kernel
-def candidate(
+@jit.kernel
+def face_of_pair(pair: narrow_phase.Pairs, k: int) -> faces.Face:
+    """Return face k of a pair: those of body b, then those of body a."""
+    count_b = faces.face_count(pair.hulls_b)
+    if k < count_b:
+        return faces.face_on(pair.b, faces.side_numbered(pair.b, pair.hulls_b, k))
+    return faces.face_on(pair.a, faces.side_numbered(pair.a, pair.hulls_a, k - count_b))
+
+
+@jit.kernel
+def candidate_on(
     number: int, is_of_b: bool, body: faces.Block, hulls: faces.AnyHulls, other: faces.Block, others: faces.AnyHulls
 ) -> Candidate:
     """Return a face of one body, with that face of the other which looks at it."""
@@ -81,36 +99,43 @@ def candidate(
     facing, against = faces.side_opposite(face.nx, face.ny, other, others, 0)
     edge = faces.edge_on(face, other, facing)
     best = references.Best(min(edge.left_gap, edge.right_gap), 1.0 * number, against)
+    reference = references.Reference(side, facing, is_of_b, best, best, best, best.gap)
     sign = 1.0 if is_of_b else -1.0
-    return Candidate(references.Reference(side, facing, is_of_b, best, best, best), sign * face.nx, sign * face.ny)
+    return Candidate(reference, sign * face.nx, sign * face.ny)
+
+
+@jit.kernel
+def candidate(pair: narrow_phase.Pairs, k: int) -> Candidate:
+    """Return face k of a pair as a candidate."""
+    count_b = faces.face_count(pair.hulls_b)
+    if k < count_b:
+        return candidate_on(k, True, pair.b, pair.hulls_b, pair.a, pair.hulls_a)
+    return candidate_on(k - count_b, False, pair.a, pair.hulls_a, pair.b, pair.hulls_b)
 
 
 @jit.rare_kernel
 def best_pressed(
-    scene: arrays.Nonsmooth, r: int, deepest: float, least: slip.Constraints, pair: narrow_phase.Pairs
+    pressed: Pressed, r: int, deepest: float, least: slip.Constraints, pair: narrow_phase.Pairs
 ) -> tuple[Candidate, bool]:
     """Return the faces with the least overlap, no deeper than `deepest` (m), of all whose normal presses a body.
 
-    Those with the normal of the constraint `least` are left out. False where there are none.
+    Those parallel to that of the constraint `least` are left out. False where there are none.
     """
-    best = candidate(0, True, pair.b, pair.hulls_b, pair.a, pair.hulls_a)
+    best = candidate(pair, 0)
     gap = -deepest
     is_found = False
-    count_b = faces.face_count(pair.hulls_b)
-    for k in range(count_b + faces.face_count(pair.hulls_a)):
-        if k < count_b:
-            one = candidate(k, True, pair.b, pair.hulls_b, pair.a, pair.hulls_a)
-        else:
-            one = candidate(k - count_b, False, pair.a, pair.hulls_a, pair.b, pair.hulls_b)
-        is_another = one.nx * least.nx + one.ny * least.ny < -PARALLEL_COSINE
-        if is_another and one.reference.best.gap > gap and is_pressed_along(scene, r, one.nx, one.ny):
-            best = one
-            gap = one.reference.best.gap
-            is_found = True
+    for k in range(faces.face_count(pair.hulls_b) + faces.face_count(pair.hulls_a)):
+        face = face_of_pair(pair, k)
+        if abs(face.nx * least.nx + face.ny * least.ny) < -PARALLEL_COSINE:
+            other = candidate(pair, k)
+            if other.reference.best.gap > gap and is_pressed_along(pressed, r, other.nx, other.ny):
+                best = other
+                gap = other.reference.best.gap
+                is_found = True
     return best, is_found
 
 
-@jit.rare_kernel
+@jit.kernel
 def overlap_and_approach(points: manifold.Points, motion: slip.Motion) -> tuple[float, float]:
     """Return how deep (m) the deeper point of a manifold is, and how fast (m/s) the bodies approach there."""
     rates = slip.slip_of(points.constraint, motion.vx, motion.vy, motion.spin_a, motion.spin_b)
@@ -119,51 +144,52 @@ def overlap_and_approach(points: manifold.Points, motion: slip.Motion) -> tuple[
     return -points.gap_two, -rates.two
 
 
-@jit.rare_kernel
-def decide(scene: arrays.Nonsmooth, r: int, corners: Any) -> None:
+@jit.kernel
+def decide(lists: narrow_phase.Lists, pressed: Pressed, r: int, corners: Any) -> None:
     """Decide where the pair of constraint r meets."""
-    contacts = scene.contacts
-    stepping = contacts.stepping[0]
-    lists = narrow_phase.Lists(contacts.constraints, contacts.states, scene.world.bodies, stepping)
+    stepping = lists.stepping
     places = (r, r, r, r)
     pair = narrow_phase.pairs_at(lists, places, 0.5 * (stepping.length - stepping.substep), corners, 0)
     found = narrow_phase.manifold_of(pair, stepping.margin)
-    constraint = contacts.constraints[r]
+    constraint = lists.constraints[r]
     inner = faces.least_inner(pair.a, pair.hulls_a, pair.b, pair.hulls_b)
-    deepest = SAG * max(deepest_at(scene, constraint.a), deepest_at(scene, constraint.b)) + UNEVEN * inner
+    deepest = SAG * max(deepest_at(pressed, constraint.a), deepest_at(pressed, constraint.b)) + UNEVEN * inner
     least = found.points.constraint
-    other, is_found = best_pressed(scene, r, deepest, least, pair)
+    other, is_found = best_pressed(pressed, r, deepest, least, pair)
     if is_found:
         instead = manifold.manifold_on(other.reference, pair.a, pair.b, stepping.margin, 0.0)
-        if is_pressed_along(scene, r, least.nx, least.ny):
+        if is_pressed_along(pressed, r, least.nx, least.ny):
             depth, rate = overlap_and_approach(found.points, pair.motion)
             its_depth, its_rate = overlap_and_approach(instead.points, pair.motion)
             if max(rate, its_rate) <= stepping.tolerance:
-                narrow_phase.write_none(contacts.constraints, places)
+                narrow_phase.write_none(lists.constraints, places)
                 return
             if its_depth * max(rate, 0.0) > depth * max(its_rate, 0.0):
                 found = instead
         else:
             found = instead
     if found.is_near:
-        narrow_phase.write(lists, places, found, pair, 0)
+        narrow_phase.write(lists, places, found, True, pair, 0)
     else:
-        narrow_phase.write_none(contacts.constraints, places)
+        narrow_phase.write_none(lists.constraints, places)
 
 
 @jit.rare_kernel
-def collect(scene: arrays.Nonsmooth) -> None:
-    """List what presses each free body of an undecided pair."""
+def collect(scene: arrays.Nonsmooth) -> int:
+    """List what presses each free body of an undecided pair, and the undecided pairs; return how many these are."""
     contacts = scene.contacts
     constraints, states, firsts = contacts.constraints, contacts.states, scene.firsts
     stepping = contacts.stepping[0]
     for i in range(firsts.size):
         firsts[i] = NOT_ASKED
+    count = 0
     for r in range(stepping.constraint_count):
         one = constraints[r]
         if one.reach == arrays.UNDECIDED:
             firsts[one.a] = 0 if states[one.a].inverse_mass > 0.0 else NOT_ASKED
             firsts[one.b] = 0 if states[one.b].inverse_mass > 0.0 else NOT_ASKED
+            scene.kept[count].undecided = r
+            count += 1
     for r in range(stepping.constraint_count):
         one = constraints[r]
         if one.reach >= arrays.TOUCHING and max(firsts[one.a], firsts[one.b]) > NOT_ASKED:
@@ -175,26 +201,30 @@ def collect(scene: arrays.Nonsmooth) -> None:
                 if firsts[one.b] > NOT_ASKED:
                     scene.kept[r].next_of_b = firsts[one.b]
                     firsts[one.b] = r + 1
+    return count
 
 
 @jit.kernel
 def decide_all(scene: arrays.Nonsmooth) -> None:
     """Decide all undecided pairs, of which threads have counted their own."""
-    count = 0.0
+    undecided = 0.0
     for k in range(scene.world.team[TEAM_SIZE]):
-        count += scene.contacts.residuals[0, 8 * k]
-    if count > 0.0:
-        collect(scene)
-        decide_some(scene, None)
+        undecided += scene.contacts.residuals[0, 8 * k]
+    if undecided > 0.0:
+        count = collect(scene)
+        decide_some(scene, count, None)
         if scene.world.corners is not None:
-            decide_some(scene, scene.world.corners)
+            decide_some(scene, count, scene.world.corners)
 
 
 @jit.rare_kernel
-def decide_some(scene: arrays.Nonsmooth, corners: Any) -> None:
-    """Decide the undecided pairs that have a polygon, or those that have none."""
-    constraints = scene.contacts.constraints
-    for r in range(scene.contacts.stepping[0].constraint_count):
-        is_polygon = narrow_phase.has_polygon(scene.world.bodies, constraints[r])
-        if constraints[r].reach == arrays.UNDECIDED and is_polygon == (corners is not None):
-            decide(scene, r, corners)
+def decide_some(scene: arrays.Nonsmooth, count: int, corners: Any) -> None:
+    """Decide those of `count` undecided pairs that have a polygon, or those that have none."""
+    constraints, bodies = scene.contacts.constraints, scene.world.bodies
+    stepping = scene.contacts.stepping[0]
+    lists = narrow_phase.Lists(constraints, scene.contacts.states, bodies, stepping)
+    pressed = Pressed(constraints, scene.kept, scene.firsts)
+    for k in range(count):
+        r = np.int64(scene.kept[k].undecided)
+        if narrow_phase.has_polygon(bodies, constraints[r]) == (corners is not None):
+            decide(lists, pressed, r, corners)

@@ -4,8 +4,8 @@ Both ends lie on the reference face (references.py), to which the face of the ot
 clipped: that gives at most two points. Each of them is a corner of one of the bodies, and impulses of polygons go with
 these corners from step to step.
 
-Pairs whose corners meet are looked at one at a time, as other faces may be right (flush_joints.py), and polygons too
-that meet beside the reference face: a face of b on which no point lies gives way to that of a.
+Pairs whose corners meet are decided one at a time, as other faces may be right (flush_joints.py). Polygons that meet
+beside the reference face are looked at one at a time too: a face of b on which no point lies gives way to that of a.
 
 A segment of ground is a line with the solid below, of which only the upper face counts. Of its face and those of the
 block, the one beyond which the other reaches least shows how the two meet, and all of the block count, whichever way
@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.simd import Lanes, Mask, is_all, lesser, select
-from blocksim.kernels.common.tolerances import FACING, NEAR_CORNER, ONE_POINT, PARALLEL_COSINE, TIE
+from blocksim.kernels.common.tolerances import FACING, NEAR_CORNER, ONE_POINT, PARALLEL_COSINE, TIE, UNEVEN
 from blocksim.kernels.nonsmooth import arrays, faces, references, slip
 
 UPPER_RIGHT, UPPER_LEFT, SHARP_RIGHT, SHARP_LEFT = 2, 3, 4, 5  # bits of corners of a segment
@@ -47,7 +47,7 @@ class Manifold(NamedTuple):
     best: references.Best
     is_left: Mask
     is_right: Mask
-    are_corners: Mask  # all points are near a corner of both bodies
+    are_corners: Mask  # they meet near a corner of both bodies, and other faces may be right
 
 
 @jit.kernel
@@ -89,14 +89,15 @@ def points_of(
 
 
 @jit.kernel
-def meet_with_corners(whole: faces.Edge, edge: faces.Edge, face: faces.Face, margin: float, near: Lanes) -> Mask:
-    """Return True where all points within the margin (m) of a face are near corners of both bodies: within `near` (m).
+def meet_with_corners(whole: faces.Edge, edge: faces.Edge, face: faces.Face, inner: Lanes) -> Mask:
+    """Return True where what is nearest to a face is near corners of both bodies; `inner` (m) is their inner radius.
 
-    Given are the other face, whole and clipped.
+    Given are the other face, whole and clipped. Of two points the nearer counts, unless both are as near.
     """
-    is_left, is_right = edge.left_gap <= margin, edge.right_gap <= margin
-    at_left = (abs(whole.left - face.left) < near) & is_left & (edge.right_gap > margin)
-    at_right = (abs(whole.right - face.right) < near) & is_right & (edge.left_gap > margin)
+    near, uneven = NEAR_CORNER * inner, UNEVEN * inner
+    apart = edge.right_gap - edge.left_gap
+    at_left = (abs(whole.left - face.left) < near) & (apart > uneven)
+    at_right = (abs(whole.right - face.right) < near) & (apart < -uneven)
     return (edge.right - edge.left < near) | at_left | at_right
 
 
@@ -111,7 +112,7 @@ def manifold_on(
     edge = faces.clip(whole, face)
     points, has_point = points_of(face, edge, a, b, is_of_b, margin)
     is_near = (best.gap <= margin) & (edge.right > edge.left) & has_point
-    are_corners = meet_with_corners(whole, edge, face, margin, NEAR_CORNER * inner)
+    are_corners = meet_with_corners(whole, edge, face, inner) & (reference.next_gap > -NEAR_CORNER * inner) & is_near
     return Manifold(points, is_near, is_of_b, best, whole.left >= face.left, whole.right <= face.right, are_corners)
 
 
@@ -123,12 +124,11 @@ def is_without_point(found: Manifold, margin: float) -> Mask:
 
 
 @jit.kernel
-def is_any_odd(found: Manifold, hulls_a: faces.AnyHulls, margin: float) -> bool:
-    """Return True if any pair has to be looked at alone."""
-    is_odd = found.is_near & found.are_corners
-    if hulls_a is not None:
-        is_odd = is_odd | is_without_point(found, margin)
-    return not is_all(select(is_odd, 1.0, 0.0) <= 0.0)
+def is_any_without_point(found: Manifold, hulls_a: faces.AnyHulls, margin: float) -> bool:
+    """Return True if any pair of polygons has to be looked at alone."""
+    if hulls_a is None:
+        return False
+    return not is_all(select(is_without_point(found, margin), 1.0, 0.0) <= 0.0)
 
 
 @jit.kernel

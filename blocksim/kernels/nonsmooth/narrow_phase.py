@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from blocksim.kernels.common import jit, simd, tolerances
 from blocksim.kernels.common.arrays import ALL, OUTLINE, Record, Records
-from blocksim.kernels.common.simd import Lane, Lanes
+from blocksim.kernels.common.simd import Lane, Lanes, Mask
 from blocksim.kernels.nonsmooth import arrays, faces, manifold, references, slip
 
 NOT_THERE = 0.5 * arrays.FAR  # m: what is FAR changes a little as bodies move
@@ -81,7 +81,13 @@ def block_at(
 
 @jit.kernel
 def follow_corners(
-    constraints: Records, places: Places, found: manifold.Manifold, hulls_a: Any, hulls_b: Any, lane: Lane
+    constraints: Records,
+    places: Places,
+    found: manifold.Manifold,
+    is_decided: Mask,
+    hulls_a: Any,
+    hulls_b: Any,
+    lane: Lane,
 ) -> None:
     """Have impulses of the last step go with the corners of polygons; where none has changed places they stay.
 
@@ -101,7 +107,7 @@ def follow_corners(
     right = simd.select(found.is_right, others + next_against, own + best.number)
     ones = simd.split(1.0 + simd.select(is_of_b, right, left))
     twos = simd.split(1.0 + simd.select(is_of_b, left, right))
-    are_near = simd.split(simd.select(found.is_near, 1.0, 0.0))
+    are_near = simd.split(simd.select(found.is_near & is_decided, 1.0, 0.0))
     for k in range(simd.WIDTH if lane is None else 1):
         if are_near[k] > 0.0:
             constraint = constraints[places[k]]
@@ -118,14 +124,14 @@ def follow_corners(
 
 
 @jit.kernel
-def write(lists: Lists, places: Places, found: manifold.Manifold, pairs: Pairs, lane: Lane) -> None:
+def write(lists: Lists, places: Places, found: manifold.Manifold, is_decided: Mask, pairs: Pairs, lane: Lane) -> None:
     """Write manifolds into constraints. Impulses along another normal are forgotten, and those without a manifold.
 
     One of a point that is not there any more goes to the other: where a block rolls over a corner, what was the right
-    end of its one face is the left end of the next.
+    end of its one face is the left end of the next. What is not decided keeps what it has, and is marked UNDECIDED.
     """
     constraints, stepping = lists.constraints, lists.stepping
-    follow_corners(constraints, places, found, pairs.hulls_a, pairs.hulls_b, lane)
+    follow_corners(constraints, places, found, is_decided, pairs.hulls_a, pairs.hulls_b, lane)
     points, motion = found.points, pairs.motion
     its = points.constraint
     # gaps as they are now, along the normal and arms of the manifold
@@ -143,16 +149,16 @@ def write(lists: Lists, places: Places, found: manifold.Manifold, pairs: Pairs, 
     normal_one = simd.select(is_only_one, normal, simd.select(is_only_two, 0.0, normal_one))
     normal_two = simd.select(is_only_two, normal, simd.select(is_only_one, 0.0, normal_two))
     shear = simd.select(are_kept, shear, 0.0)
-    are_all = abs(its.width) >= 0.0
-    simd.write_fields_0(lane, constraints, places, are_all, (its.nx, its.ny, its.arm_a, its.arm_b))
-    simd.write_fields_4(lane, constraints, places, are_all, (its.width, its.shear_arm_a, its.shear_arm_b, gap_one))
-    simd.write_fields_8(lane, constraints, places, are_all, (gap_two, normal_one, normal_two, shear))
+    simd.write_fields_0(lane, constraints, places, is_decided, (its.nx, its.ny, its.arm_a, its.arm_b))
+    simd.write_fields_4(lane, constraints, places, is_decided, (its.width, its.shear_arm_a, its.shear_arm_b, gap_one))
+    simd.write_fields_8(lane, constraints, places, is_decided, (gap_two, normal_one, normal_two, shear))
     bend = slip.bend_of(its, motion, points.is_of_b, normal_two > normal_one)
     is_pressed = slip.presses(normal_one + normal_two, pairs.inverse_mass, stepping)
     is_touching = (simd.lesser(gap_one, gap_two) <= stepping.touch_gap) | is_pressed
     reach = simd.select(
         found.is_near, simd.select(is_touching, 1.0 * arrays.TOUCHING, 1.0 * arrays.OPEN), 1.0 * arrays.AWAY
     )
+    reach = simd.select(is_decided, reach, 1.0 * arrays.UNDECIDED)
     one, two, three, last = (
         constraints[places[0]],
         constraints[places[1]],
@@ -177,7 +183,8 @@ def write_none(constraints: Records, places: Places) -> None:
 def collide_four(lists: Lists, places: Places, ahead: float, corners: Any) -> int:
     """Find the manifolds of four pairs of blocks; those that press a time `ahead` (s). Without `corners`: rectangles.
 
-    Where corners of any pair meet, all four are looked at alone. Returns how many are left UNDECIDED.
+    Where any pair of polygons meets beside its reference face, all four are looked at alone. Returns how many are left
+    UNDECIDED.
     """
     margin = lists.stepping.margin
     pairs = pairs_at(lists, places, ahead, corners, None)
@@ -187,13 +194,14 @@ def collide_four(lists: Lists, places: Places, ahead: float, corners: Any) -> in
         write_none(lists.constraints, places)
         return 0
     found = manifold.manifold_on(reference, a, b, margin, faces.least_inner(a, hulls_a, b, hulls_b))
-    count = 0
-    if manifold.is_any_odd(found, hulls_a, margin):
+    if manifold.is_any_without_point(found, hulls_a, margin):
+        count = 0
         for r in places:
             count += collide_one(lists, r, ahead, corners)
-    else:
-        write(lists, places, found, pairs, None)
-    return count
+        return count
+    write(lists, places, found, (found.points.gap_one >= -arrays.FAR) ^ found.are_corners, pairs, None)
+    one, two, three, last = simd.split(simd.select(found.are_corners, 1.0, 0.0))
+    return int(one + two + three + last)
 
 
 @jit.kernel
@@ -223,11 +231,11 @@ def collide_one(lists: Lists, r: int, ahead: float, corners: Any) -> int:
         found = manifold.manifold_on_segment(a, hulls_a, b, two.corners, True, margin)
     else:
         found = manifold_of(pair, margin)
-    if found.is_near and found.are_corners:
+    if found.are_corners:
         constraint.reach = arrays.UNDECIDED
         return 1
     if found.is_near:
-        write(lists, places, found, pair, 0)
+        write(lists, places, found, True, pair, 0)
     else:
         write_none(lists.constraints, places)
     return 0

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.common import jit, shapes
 from blocksim.kernels.common.simd import Lane, Lanes, Mask, greater, is_all, lesser, select
-from blocksim.kernels.common.tolerances import TIE
+from blocksim.kernels.common.tolerances import PARALLEL_COSINE, TIE
 from blocksim.kernels.nonsmooth import arrays, faces
 
 
@@ -66,6 +66,7 @@ class Reference(NamedTuple):
     best: Best
     of_b: Best
     of_a: Best
+    next_gap: Lanes  # m: beyond the best face that is not parallel to it; of polygons a bound
 
 
 @jit.kernel
@@ -90,9 +91,13 @@ def reference_of_rectangles(a: faces.Block, b: faces.Block) -> Reference:
     is_turned = (c_abs < s_abs) | (along_x & (c_abs <= s_abs))
     away = sign * select(is_turned, select(along_x ^ is_of_b, s, -s), c)
     side = faces.side_of_rectangle(faces.either(is_of_b, b, a), along_x, sign)
-    facing = faces.side_of_rectangle(faces.either(is_of_b, a, b), along_x ^ is_turned, select(away > 0.0, -1.0, 1.0))
+    facing_x = along_x ^ is_turned
+    facing = faces.side_of_rectangle(faces.either(is_of_b, a, b), facing_x, select(away > 0.0, -1.0, 1.0))
     best = Best(greater(best_a, best_b), sign, sign)
-    return Reference(side, facing, is_of_b, best, best, best)
+    across = select(facing_x, select(is_of_b, gap_ay, gap_by), select(is_of_b, gap_ax, gap_bx))
+    are_parallel = greater(c_abs, s_abs) > -PARALLEL_COSINE
+    next_gap = greater(lesser(of_x, of_y), select(are_parallel, across, select(is_of_b, best_a, best_b)))
+    return Reference(side, facing, is_of_b, best, best, best, next_gap)
 
 
 @jit.kernel
@@ -185,7 +190,7 @@ def reference_on(
     )
     side = faces.side_at(hulls_a.table, select(is_of_b, hulls_b.first, hulls_a.first) + best.number, lane)
     facing = faces.side_at(hulls_a.table, select(is_of_b, hulls_a.first, hulls_b.first) + best.against, lane)
-    return Reference(side, facing, is_of_b, best, of_b, of_a)
+    return Reference(side, facing, is_of_b, best, of_b, of_a, best.gap)
 
 
 @jit.kernel
