@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.scenario import Scenario
+from blocksim.scenario import Scenario, place_bodies
 from blocksim.scenario.models.actuators import PathTable, stretches_of
 from blocksim.scenario.models.loads import Stretch
+from blocksim.scenario.placement import smallest_width
 from blocksim.simulation import simulate
+from blocksim.simulation.schemes import build_scene
 from tests.simulation.test_probes import WEIGHT, both, scene
 
 BRICK = {"block": "brick", "name": "b", "x": 0.0, "y": 0.05}
@@ -70,6 +72,14 @@ def test_no_head_however_fast_drives_a_block_through_another(scheme: str, is_fix
     fast = {"kind": "table", "times": [0.0, 0.1, 0.102], "displacements": [0.0, 0.0, 2.0]}
     run = simulate(pushed(scheme, bodies=bodies, displacement=fast))
     assert run.status == "failed" or run.frames.x[-1][0] < run.frames.x[-1][1]
+
+
+def test_rigid_overlaps_are_looked_at_before_a_head_has_gone_half_a_block() -> None:
+    for speed in (1.0, 10.0, 100.0):  # m/s
+        path = {"kind": "table", "times": [0.0, 0.1, 0.2], "displacements": [0.0, 0.0, 0.1 * speed]}
+        scenario = pushed("nonsmooth", displacement=path)
+        controls = build_scene(scenario).world.controls[0]
+        assert speed * controls.step * controls.check_every <= 0.5 * smallest_width(place_bodies(scenario))
 
 
 @both

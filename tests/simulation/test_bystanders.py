@@ -12,10 +12,14 @@ from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 
 AWAY = 5.0  # m
 TIME = {"scheme": "nonsmooth", "step": 1e-3, "substeps": 4, "velocity_tolerance": 1e-6, "stop_at_rest": False}
-BYSTANDERS: list[dict[str, Any]] = [
-    *({"x": AWAY + 2.0 * k * WIDTH, "y": HEIGHT / 2} for k in range(9)),
-    {"x": AWAY, "y": 3.0, "velocity": [0.3, 0.1], "spin": "20 deg/s"},
+RESTING: list[dict[str, Any]] = [{"x": AWAY + 2.0 * k * WIDTH, "y": HEIGHT / 2} for k in range(9)]
+FLYING: list[dict[str, Any]] = [
+    {"x": AWAY + 2.0 * k * WIDTH, "y": 3.0 + 0.1 * k, "velocity": [0.3 * k, 0.1], "spin": "20 deg/s"} for k in range(4)
 ]
+LARGE: list[dict[str, Any]] = [
+    {"x": -AWAY - 3.0 * k * WIDTH, "y": HEIGHT, "width": 2.0 * WIDTH, "height": 2.0 * HEIGHT} for k in range(3)
+]
+BYSTANDERS = [*RESTING, FLYING[0]]
 
 
 def scene_of(seed: int) -> tuple[list[dict[str, Any]], dict[str, Any]]:
@@ -43,6 +47,14 @@ def test_loads_on_blocks_far_away_change_no_bit(seed: int) -> None:
     load = {"kind": "force", "body": str(len(bodies) + 1), "magnitude": "1 mN", "direction": "0 deg"}
     free, loaded = (end_of([*bodies, *BYSTANDERS], contact, loads=loads)[: len(bodies)] for loads in ([], [load]))
     assert loaded.tolist() == free.tolist()
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_blocks_at_rest_and_in_flight_far_away_change_no_bit(seed: int) -> None:
+    bodies, contact = scene_of(seed)
+    alone = end_of(bodies, contact).tolist()
+    for far in (RESTING, FLYING, LARGE, [*FLYING, *RESTING, *LARGE]):
+        assert end_of([*bodies, *far], contact)[: len(bodies)].tolist() == alone
 
 
 @pytest.mark.parametrize("impacts", ["simultaneous", "sequential"])
