@@ -13,7 +13,7 @@ from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.world import build, memory, rigid_step, sag, step
 from blocksim.world.bodies import Layout
 
-MOST_REACH = 2.0  # of a body, in skins
+MOST_REACH = 1.5  # of a body, in skins
 ROOM = 2  # of the room for pairs of springs: fast bodies have more within reach
 FINEST, FINE, COARSE = 1e-6, 1e-3, 0.1  # m/s: tolerances of the velocity pass; see velocity_tolerance
 CROWD = 100  # blocks

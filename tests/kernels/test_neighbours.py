@@ -173,14 +173,17 @@ def found_neighbours(world: World) -> list[list[int]]:
     ground, reach = world.bodies.size - 1, float(world.controls[0].skin)
     kept: Any = zeros(ground * ground, PAIR)
     found: list[list[int]] = [[] for _ in range(ground)]
-    for a, b in kept[: list_pairs(world, kept, None, reach)][["a", "b"]].tolist():
+    for a, b in kept[: list_pairs(world, kept, None, reach, False)][["a", "b"]].tolist():
         if b < ground:
             found[a].append(b)
+    stale = Stale(np.ones(ground + 1, np.int64), 0.5 * np.full(ground + 1, reach))
+    at_once = kept[: list_pairs(world, kept, stale, 0.0, True)][["a", "b"]].tolist()
+    assert sorted(pair for pair in at_once if pair[1] < ground) == [(a, b) for a in range(ground) for b in found[a]]
     others: list[tuple[int, int]] = []
     marks = np.arange(ground + 1) % 2
     for half in (marks, 1 - marks):
         stale = Stale(half, 0.5 * np.full(ground + 1, reach))
-        others += kept[: list_pairs(world, kept, stale, 0.0)][["a", "b"]].tolist()
+        others += kept[: list_pairs(world, kept, stale, 0.0, False)][["a", "b"]].tolist()
     mixed = [(a, b) for a, b in others if b < ground and a % 2 != b % 2]
     assert len(mixed) == 2 * len(set(mixed))  # from both halves
     assert sorted({pair for pair in others if pair[1] < ground}) == [(a, b) for a in range(ground) for b in found[a]]

@@ -201,15 +201,17 @@ def add_from_cell(
     i: int,
     grid: CellGrid,
     cell: tuple[int, int],
+    is_whole: bool,
     count: int,
 ) -> int:
-    """List body i with what is near it in a cell (column, row); return the count needed."""
+    """List body i with what is near it in a cell (column, row), the whole of it or not; return the count needed."""
     column, row = cell
     number = endless_number(grid, column, row)
     for k in range(world.starts[number], world.starts[number + 1]):
         j = world.order[k]
         other = world.bodies[j]
-        if is_listed_from(stale, i, j) and other.radius <= world.controls[0].cell_radius:
+        is_listed = is_whole or is_listed_from(stale, i, j)
+        if is_listed and other.radius <= world.controls[0].cell_radius:
             more = add_if_near(world, pairs, stale, reach, i, j, count)
             # the cell may share its number with others
             if more > count and cell_along(other.x, grid.x, grid.size) == column:
@@ -232,11 +234,13 @@ def is_listed_from(stale: Stale | None, i: int, j: int) -> bool:
 
 
 @jit.rare_kernel
-def list_pairs(world: arrays.World, pairs: Any, stale: Stale | None, reach: float) -> int:
+def list_pairs(world: arrays.World, pairs: Any, stale: Stale | None, reach: float, is_half: bool) -> int:
     """List all pairs of bodies that are near one another; return how many there are, fitting or not.
 
     Each pair is found from one body, in the cells all around it: from the first, or from the only one that is marked.
-    Pairs found from one body are sorted. Bodies too large for the cells, and the ground, are tested one by one.
+    Pairs found from one body are sorted. Where all bodies are asked for, `is_half` visits each two neighbouring cells
+    from one of them only: from the left one, or the lower one. Bodies too large for the cells, and the ground, are
+    tested one by one.
     """
     controls, bodies, starts = world.controls[0], world.bodies, world.starts
     ground = bodies.size - 1
@@ -249,19 +253,23 @@ def list_pairs(world: arrays.World, pairs: Any, stale: Stale | None, reach: floa
             continue
         body = bodies[i]
         first_pair = count
-        if body.radius > controls.cell_radius:
+        is_large = body.radius > controls.cell_radius
+        if is_large and not is_half:
             for j in range(ground):
                 if is_listed_from(stale, i, j):
                     count = add_if_near(world, pairs, stale, reach, i, j, count)
-        else:
+        if not is_large:
             own_column, own_row = cell_along(body.x, 0.0, grid.size), cell_along(body.y, 0.0, grid.size)
-            for row in range(own_row - 1, own_row + 2):
-                for column in range(own_column - 1, own_column + 2):
-                    count = add_from_cell(world, pairs, stale, reach, i, grid, (column, row), count)
+            for row in range(own_row if is_half else own_row - 1, own_row + 2):
+                for column in range(own_column if is_half and row == own_row else own_column - 1, own_column + 2):
+                    is_whole = is_half and (row > own_row or column > own_column)
+                    count = add_from_cell(world, pairs, stale, reach, i, grid, (column, row), is_whole, count)
+        if is_half or not is_large:
             for j in world.large:
-                if is_listed_from(stale, i, j):
+                if is_listed_from(stale, i, j) or (is_half and not is_large):
                     count = add_if_near(world, pairs, stale, reach, i, j, count)
-        sort_pairs(pairs, first_pair, min(count, pairs.size))
+        if not is_half:
+            sort_pairs(pairs, first_pair, min(count, pairs.size))
         count = add_if_near(world, pairs, stale, reach, i, ground, count)
     return count
 

@@ -98,7 +98,7 @@ def carry_history(world: arrays.World, count: int) -> int:
 def rebuild_pairs(world: arrays.World) -> bool:
     """Rebuild the pair list; return False, with the old list untouched but for candidates, where it does not fit."""
     listed = world.candidates.view(arrays.NEAR_PAIR)[:, 0]
-    count = neighbours.list_pairs(world, listed, None, list_reach(world.controls[0]))
+    count = neighbours.list_pairs(world, listed, None, list_reach(world.controls[0]), False)
     if count > world.pairs.size:
         return False
     count = carry_history(world, count)

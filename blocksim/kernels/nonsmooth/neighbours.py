@@ -225,7 +225,7 @@ def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
             ahead = REACH_STEPS * world.controls[0].step * neighbours.top_speed(body, frame.vx, frame.vy)
             scene.reaches[i] = min(max(ahead, stepping.least_reach), stepping.most_reach)
     stale = neighbours.Stale(scene.firsts, scene.reaches)
-    count = keep_fresh(scene, neighbours.list_pairs(world, scene.kept, stale, 0.0))
+    count = keep_fresh(scene, neighbours.list_pairs(world, scene.kept, stale, 0.0, world.clock[0].rebuilds == 0))
     fits = count <= scene.kept.size
     if fits:
         keep_impulses(scene, count)
