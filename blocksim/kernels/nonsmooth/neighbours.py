@@ -228,12 +228,14 @@ def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
     count = keep_fresh(scene, neighbours.list_pairs(world, scene.kept, stale, 0.0, world.clock[0].rebuilds == 0))
     fits = count <= scene.kept.size
     if fits:
-        keep_impulses(scene, count)
         colour_pairs(scene, count)
         fits = most_packs(scene) <= contacts.packs.size
     if not fits:
-        world.clock[0].rebuilds = 0
+        for i in range(world.bodies.size - 1):
+            if scene.firsts[i] > 0:
+                scene.reaches[i] = -1.0  # so that the same bodies are listed anew by the next call
         return False
+    keep_impulses(scene, count)
     next_place = contacts.ends
     for colour in range(next_place.size):
         next_place[colour] = scene.begins[colour]
