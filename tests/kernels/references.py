@@ -145,7 +145,7 @@ def meet(
     if collide_one(lists, 0, ahead, None):  # no third body presses
         places = (0, 0, 0, 0)
         pair = pairs_at(lists, places, ahead, None, 0)
-        write(lists, places, manifold_of(pair, margin), pair, 0)
+        write(lists, places, manifold_of(pair, margin), True, pair, 0)
     return constraints[0]
 
 

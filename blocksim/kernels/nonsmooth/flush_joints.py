@@ -227,4 +227,4 @@ def decide_some(scene: arrays.Nonsmooth, count: int, corners: Any) -> None:
     for k in range(count):
         r = np.int64(scene.kept[k].undecided)
         if narrow_phase.has_polygon(bodies, constraints[r]) == (corners is not None):
-            decide(lists, pressed, r, corners)
+            decide(lists, pressed, int(r), corners)
