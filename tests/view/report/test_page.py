@@ -81,6 +81,7 @@ def test_report_names_the_outcome_and_the_block_that_moved_first(tmp_path: Path)
         "rotated_block": "3",
         "first_mover": "3",
         "first_moved_s": 0.045,
+        "fastest_m_s": 0.1,
     }
     movement = Movement.model_validate(known)
     moved = replace(stored, summary=stored.summary.model_copy(update={"movement": movement}))
