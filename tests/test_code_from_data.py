@@ -16,6 +16,7 @@ FLAGS = {"shell", "allow_pickle"}
 EXCEPTIONS = {
     "bench/registry.py: subprocess.run": "measures how long `blocksim --help` takes to start: its own fixed command",
     "kernels/common/jit.py: pickle": "machine code, as numba keeps it: from a cache folder of this user",
+    "simulation/stores/hdf5.py: ctypes": "keeps a file that could not be written from being closed: no data",
     "study/live.py: subprocess.Popen": "starts the page of --live: this program, the folder of the run",
     "view/animation.py: subprocess.run": "asks the ffmpeg on the PATH which encoders it has: a fixed command",
     "view/animation.py: subprocess.Popen": "gives pixels to the ffmpeg on the PATH: fixed options, its path",
