@@ -30,7 +30,8 @@ def test_it_is_written_and_loaded_bit_equal(data: dict[str, Any]) -> None:
 def test_it_passes_the_check_runs_resumes_and_ends_the_same_on_two_threads(data: dict[str, Any]) -> None:
     moment = {**data["time"], "end": 1e-3, "stop_at_rest": False}
     scenario = scenario_from_mapping({**data, "time": moment, "output": {"every": 2.5e-4}})
-    assert describe(scenario).frames == 5
+    steps = round(1e-3 / describe(scenario).step)  # few where nothing presses
+    assert describe(scenario).frames == 1 + max(1, min(4, steps))
     straight = run(scenario)
     assert straight.status in {"finished", "failed"}, straight.reason
     with pytest.MonkeyPatch.context() as patch:  # small scenes would not use them

@@ -93,7 +93,10 @@ def thrust_shift(layout: Layout) -> float:
     if assembly is None:
         return 0.0
     frame = _frame(placed, assembly)
-    rest = _at_rest(frame, applied_forces(layout, assembly.blocks))
+    forces = applied_forces(layout, assembly.blocks)
+    if not np.square(forces).max() > 0.0:  # none, or so small that their squares vanish
+        return 0.0
+    rest = _at_rest(frame, forces)
     return 0.0 if rest is None else _greatest_shift(frame, *rest) * (COURSED if frame.is_coursed else 1.0)
 
 
