@@ -75,7 +75,7 @@ def test_no_head_however_fast_drives_a_block_through_another(scheme: str, is_fix
 
 
 def test_rigid_overlaps_are_looked_at_before_a_head_has_gone_half_a_block() -> None:
-    for speed in (1.0, 10.0, 100.0):  # m/s
+    for speed in (10.0, 1000.0):  # m/s
         path = {"kind": "table", "times": [0.0, 0.1, 0.2], "displacements": [0.0, 0.0, 0.1 * speed]}
         scenario = pushed("nonsmooth", displacement=path)
         controls = build_scene(scenario).world.controls[0]
