@@ -19,6 +19,16 @@ from tests.view.report.folders import write_run
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SOFT = ("--set", "contact.stiffness_scale=0.001")
+# a Dask cluster in a process of its own, until its input ends
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+
+if __name__ == "__main__":
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs=50) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
 START = "from blocksim.cli.app import main; main()"
 SMALL_DISK = "import shutil, types; shutil.disk_usage = lambda _: types.SimpleNamespace(free=10**9)"  # on every machine
 

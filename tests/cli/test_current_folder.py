@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.cli.commands import COMMANDS
-from tests.cli.conftest import SCENARIOS, SOFT
+from tests.cli.conftest import CLUSTER, SCENARIOS, SOFT
 
 ROOT = Path(__file__).parents[2]
 NAMES = sorted({*sys.stdlib_module_names, *packages_distributions(), "sitecustomize", "usercustomize", "yaml"})
@@ -118,17 +118,6 @@ def test_an_empty_entry_of_the_path_for_modules_gives_a_command_no_package(folde
     done = call(folder, START, *COMMANDS_IN_TURN[5], PYTHONPATH=f"{os.environ.get('PYTHONPATH', ROOT)}:")
     assert done.returncode == 0, done.stderr
     assert executed(folder) == []
-
-
-CLUSTER = """
-import sys
-from distributed import LocalCluster
-
-if __name__ == "__main__":
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs=50) as cluster:
-        print(cluster.scheduler_address, flush=True)
-        sys.stdin.read()
-"""
 
 
 @pytest.mark.long

@@ -15,7 +15,18 @@ from pathlib import Path
 import pytest
 
 from blocksim.study.manifest import read_entries
-from tests.cli.conftest import PATIENCE, SOFT, Answer, Command, Process, Running, end_of, wait_for, wait_until
+from tests.cli.conftest import (
+    CLUSTER,
+    PATIENCE,
+    SOFT,
+    Answer,
+    Command,
+    Process,
+    Running,
+    end_of,
+    wait_for,
+    wait_until,
+)
 from tests.sizes import in_all
 
 Sweep = Callable[..., Running]
@@ -115,17 +126,6 @@ def test_of_three_sweeps_that_begin_in_a_folder_at_once_two_are_refused(process:
     told = [(one.communicate()[1], one.returncode) for one in three]
     assert sorted(code for _, code in told) == [-signal.SIGKILL, 73, 73], told
     assert all("is running here" in err or "is already running" in err for err, code in told if code == 73)
-
-
-CLUSTER = """
-import sys
-from distributed import LocalCluster
-
-if __name__ == "__main__":
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs=50) as cluster:
-        print(cluster.scheduler_address, flush=True)
-        sys.stdin.read()
-"""
 
 
 @pytest.mark.long
