@@ -6,6 +6,7 @@ does not depend on their number. So all arrays have the members along their firs
 member of a stack. `couple` adds systems beside blocks and supports.
 """
 
+import inspect
 import math
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
@@ -415,7 +416,7 @@ def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
             "sph_kernel": kernel,
             "particle_size": contact.particle_spacing,
             "smoothing_length": smoothing_length,
-            "support": support_radius(kernel, smoothing_length),
+            "support": inspect.unwrap(support_radius)(kernel, smoothing_length),  # no machine code for one product
             "check_every": every,
             "rest_checks": rest_checks,
             "push": layout.applied.push,
