@@ -110,7 +110,7 @@ def main() -> None:
     """Run the command line; every error becomes a message and an exit code."""
     began = time.monotonic()
     _distrust_current_folder()
-    gc.set_threshold(50_000)  # what imports and pictures make by the thousand lives to the end
+    gc.set_threshold(200_000)  # what imports and pictures make by the thousand lives to the end
     with suppress(ValueError):  # not the main thread, which alone receives signals
         interrupts = Interrupts()
         for name in {"SIGTERM", "SIGHUP"} & set(signal.Signals.__members__):

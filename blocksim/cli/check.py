@@ -77,13 +77,15 @@ def check_command(
         return command_line.Report(data={"scenario": ready.model_dump(mode="json", by_alias=True), **data})
     if resolved:
         return command_line.Report([scenario_to_toml(ready)])
+    if screen.quiet:
+        return command_line.Report()
     tables = [list(_summary(ready, description))]
     if description.bodies:
         tables += [_bodies(description.bodies), _pairs(ready, description.pairs), _rules(description.pairs)]
     lines = "\n\n".join("\n".join(table) for table in tables)
     warnings = [*check.implausible_values(ready), *description.warnings, *of_table]
     notes = [*(f"warning: {text}" for text in warnings), f"{ready.name}: valid"]
-    return command_line.Report([] if screen.quiet else [lines], notes=notes)
+    return command_line.Report([lines], notes=notes)
 
 
 def _summary(scenario: Scenario, description: describe.Description) -> Iterator[str]:

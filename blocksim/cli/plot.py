@@ -10,7 +10,9 @@ from blocksim.options import Option, Replace, silent
 from blocksim.simulation import files
 from blocksim.simulation.stores.exports import FORMATS
 from blocksim.study import compare, pictures, report, run_folder
+from blocksim.view import style
 
+style.are_docstrings_read = False
 MEGABYTE = 1e6
 RunPath = Annotated[
     Path,

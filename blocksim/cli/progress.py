@@ -2,13 +2,12 @@
 
 import math
 import os
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, TypeVar
-
-from rich.console import Console
 
 from blocksim.cli.output import note
 from blocksim.errors import StoppedEarlyError
@@ -43,14 +42,18 @@ def pace(seconds: float, since: float | None = None) -> Callable[[], bool]:
     return is_due
 
 
+def is_on_terminal() -> bool:
+    """Return True if somebody watches the notes."""
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
 @contextmanager
 def run_progress(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
     """Give a function that shows the progress of a run; on a terminal the line disappears at the end."""
-    console = Console(stderr=True)
     if quiet:
         yield silent
         return
-    if not console.is_terminal:
+    if not is_on_terminal():
         is_time = pace(PLAIN_SECONDS)
 
         def show_line(where: "Where") -> None:
@@ -62,7 +65,7 @@ def run_progress(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
         yield show_line
         return
     rates = "{task.fields[speed]} steps/s, relative energy error {task.fields[residual]}"
-    progress = _bar(console, "{task.completed:.3f} of {task.total:g} s", rates)
+    progress = _bar("{task.completed:.3f} of {task.total:g} s", rates)
     task = progress.add_task("", total=1.0, visible=False, speed="", residual="")
     is_due = pace(LIVE_SECONDS, 0.0)
     began: tuple[float, int] | None = None  # time and steps when first shown: it compiles before, and may be resumed
@@ -88,11 +91,10 @@ def run_progress(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
 @contextmanager
 def count_progress(what: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
     """Give a function that shows how many of all are done; on a terminal the line disappears at the end."""
-    console = Console(stderr=True)
     if quiet:
         yield silent
-    elif console.is_terminal:
-        with _bar(console, "{task.completed} of {task.total} {task.description}") as progress:
+    elif is_on_terminal():
+        with _bar("{task.completed} of {task.total} {task.description}") as progress:
             task = progress.add_task(what, total=1, visible=False)
             yield lambda done, total: progress.update(task, completed=done, total=total, visible=True)
     else:
@@ -100,13 +102,14 @@ def count_progress(what: str, *, quiet: bool) -> Iterator[Callable[[int, int], N
         yield lambda done, total: note(f"{done} of {total} {what}") if is_due() else None
 
 
-def _bar(console: Console, first: str, *others: str) -> "Progress":
+def _bar(first: str, *others: str) -> "Progress":
     """Return a live line: a text, a bar, other texts and the time that remains."""
+    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     texts = map(TextColumn, others)
     bar = BarColumn(bar_width=None)
-    return Progress(TextColumn(first), bar, *texts, TimeRemainingColumn(), console=console, transient=True)
+    return Progress(TextColumn(first), bar, *texts, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
 
 
 def one_by_one(items: Sequence[T], told: Callable[[T], str], *, quiet: bool) -> Iterator[T]:
@@ -140,7 +143,7 @@ def case_progress(heads: "Iterable[Head]", *, quiet: bool) -> "Iterator[Callable
     if quiet:
         yield silent
         return
-    if Console(stderr=True).is_terminal:
+    if is_on_terminal():
         with count_progress("cases", quiet=False) as count:
             yield lambda done, total, _: count(done, total)
         return

@@ -100,9 +100,18 @@ def picture_path(path: Path | str) -> Path:
     return path
 
 
+are_docstrings_read = True
+"""Whether somebody may read docstrings of matplotlib in this process; a command, in which nobody does, sets it."""
+
+
 @contextmanager
 def open_figure(width: float, height: float, dots: float | None = None) -> Iterator["Figure"]:
     """Give an empty figure of `width` x `height` inches, in this style; needs no display. `dots` are those an inch."""
+    from matplotlib import artist
+
+    if not are_docstrings_read:
+        # lists of properties, a quarter of what importing the rest takes
+        artist.kwdoc = lambda _: ""  # type: ignore[assignment]  # an argument without a name
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -19,7 +19,8 @@ from tests.cli.conftest import SCENARIOS, SOFT, Command
 from tests.golden import Golden
 
 HEAVY = ("numba", "pandas", "h5py", "matplotlib", "numpy")
-UNUSED_BY_A_RUN = ("pandas", "matplotlib", "multiprocessing.pool", "blocksim.study.sweep")
+UNUSED_BY_A_RUN = ("pandas", "matplotlib", "multiprocessing.pool", "rich", "blocksim.study.sweep")
+MACHINE_CODE = "numba.np.arraymath"  # loaded with the first compiled kernel
 
 
 @pytest.mark.parametrize("name", ["", *COMMANDS])
@@ -45,6 +46,27 @@ def test_help_does_not_wait_for_heavy_packages_nor_a_compared_run_for_pandas_and
     assert loaded(HEAVY, "--help") == "0 []"
     run = ("run", SCENARIOS / "three_blocks.toml", "--out", tmp_path / "run", *SOFT)
     assert loaded(UNUSED_BY_A_RUN, *run) == "0 []"
+
+
+def test_a_check_loads_no_machine_code_and_a_quiet_one_no_linear_programmes() -> None:
+    check, unused = ("check", SCENARIOS / "three_blocks.toml"), (MACHINE_CODE, "scipy.optimize", "h5py", "rich")
+    assert loaded(unused, *check) == "0 ['scipy.optimize']"
+    assert loaded(unused, *check, "--quiet") == "0 []"
+
+
+def test_a_plot_of_the_command_leaves_out_docstrings_and_one_from_python_does_not(tmp_path: Path) -> None:
+    scenario, picture = SCENARIOS / "shaking_table.toml", tmp_path / "motion.png"
+    calls = {
+        f"blocksim.plot({str(scenario)!r}, kind='motion', out={str(picture)!r})": "True",
+        f"blocksim.cli.commands.app(['plot', {str(scenario)!r}, '--kind', 'motion', '--out', {str(picture)!r}], "
+        "standalone_mode=False)": "False",
+    }
+    for call, is_listed in calls.items():
+        code = f"import blocksim.cli.commands; {call}; from matplotlib import lines; "
+        code += "print('agg_filter' in lines.Line2D.set.__doc__)"
+        assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == (
+            f"{is_listed}\n"
+        )
 
 
 def test_every_command_is_in_one_group_of_the_list() -> None:

@@ -66,7 +66,8 @@ def test_compiled_solver_that_cannot_be_kept_is_reported(
 def terminal(monkeypatch: pytest.MonkeyPatch) -> StringIO:
     """Have a terminal in place of standard error."""
     screen = StringIO()
-    monkeypatch.setattr(progress, "Console", lambda **_: Console(file=screen, force_terminal=True, width=80))
+    monkeypatch.setattr(progress, "is_on_terminal", lambda: True)
+    monkeypatch.setattr("rich.console.Console", lambda **_: Console(file=screen, force_terminal=True, width=80))
     return screen
 
 
