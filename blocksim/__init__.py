@@ -16,6 +16,8 @@ Scenarios: `load` (a file or dictionaries), `replace` (change keys, validated). 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from blocksim.notebook import draw_with
+
 if TYPE_CHECKING:
     from blocksim.scenario import load_scenario as load, replace_values as replace
     from blocksim.study.calibrate import calibrate
@@ -54,34 +56,26 @@ __all__ = [
     "sweep",
 ]
 
-# found when first asked for, so that `blocksim --help` need not wait for numba and pandas
+# found when first asked for, so that `blocksim --help` need not wait for numba and pandas; as blocksim.study.NAME has
+# them, or another module, under another name
 _HOMES = {
-    "animate": ("blocksim.study.pictures", "animate"),
-    "calibrate": ("blocksim.study.calibrate", "calibrate"),
-    "capacity": ("blocksim.study.capacity", "capacity"),
-    "compare": ("blocksim.study.compare", "compare"),
-    "converge": ("blocksim.study.converge", "converge"),
-    "fragility": ("blocksim.study.fragility", "fragility"),
-    "limit": ("blocksim.study.limit", "limit"),
-    "limit_curve": ("blocksim.study.limit", "limit_curve"),
-    "load": ("blocksim.scenario", "load_scenario"),
-    "open_run": ("blocksim.study.run", "open_run"),
-    "open_sweep": ("blocksim.study.manifest", "read_sweep"),
-    "plot": ("blocksim.study.pictures", "plot"),
-    "replace": ("blocksim.scenario", "replace_values"),
-    "report": ("blocksim.study.report", "report"),
-    "run": ("blocksim.study.run", "run"),
-    "sensitivity": ("blocksim.study.sensitivity", "sensitivity"),
-    "static_limit": ("blocksim.study.static_limit", "static_limit"),
-    "sweep": ("blocksim.study.sweep", "sweep"),
+    "animate": ("study.pictures", "animate"),
+    "limit_curve": ("study.limit", "limit_curve"),
+    "load": ("scenario", "load_scenario"),
+    "open_run": ("study.run", "open_run"),
+    "open_sweep": ("study.manifest", "read_sweep"),
+    "plot": ("study.pictures", "plot"),
+    "replace": ("scenario", "replace_values"),
 }
+
+draw_with(lambda: import_module("blocksim.study.displays"))
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in __all__:
         raise AttributeError(f"module 'blocksim' has no attribute '{name}'")
-    module, attribute = _HOMES[name]
-    return getattr(import_module(module), attribute)
+    module, attribute = _HOMES.get(name, (f"study.{name}", name))
+    return getattr(import_module(f"blocksim.{module}"), attribute)
 
 
 def __dir__() -> list[str]:

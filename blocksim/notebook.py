@@ -1,10 +1,13 @@
-"""What results are in a notebook: they draw themselves by code far above them, loaded when first asked for."""
+"""What results are in a notebook: they draw themselves by code far above them, which the package registers here.
 
-from importlib import import_module
-from pathlib import Path
-from typing import Any, Protocol, cast
+It is light, as the package imports it.
+"""
 
-from blocksim.errors import BlocksimError
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 class Display(Protocol):
@@ -15,13 +18,21 @@ class Display(Protocol):
         """The figure of matplotlib; None for animations and pages."""
         ...
 
-    def save(self, path: Path | str, *, overwrite: bool = False) -> Path:
+    def save(self, path: "Path | str", *, overwrite: bool = False) -> "Path":
         """Write it in the format that the suffix names. Raises InvalidInputError, OutputExistsError, OutputError."""
         ...
 
     def _repr_png_(self) -> bytes | None: ...
 
     def _repr_html_(self) -> str: ...
+
+
+_sources: list[Callable[[], Any]] = []
+
+
+def draw_with(source: Callable[[], Any]) -> None:
+    """Register what gives the functions of blocksim.study.displays; it is asked when a result is first drawn."""
+    _sources[:] = [source]
 
 
 class Shown:
@@ -38,7 +49,7 @@ class Shown:
         """Return an animation, of a run; options are those of `blocksim.animate`. Raises InvalidInputError."""
         return self._made("animation_of", **options)
 
-    def report(self, experiment: Path | str | None = None) -> Display:
+    def report(self, experiment: "Path | str | None" = None) -> Display:
         """Return the page of `blocksim.report`. Raises InvalidInputError, also for what is damaged in a folder."""
         return self._made("page_of", experiment=experiment)
 
@@ -47,11 +58,8 @@ class Shown:
         return self._picture()
 
     def _made(self, function: str, **options: Any) -> Display:
-        return cast("Display", getattr(import_module("blocksim.study.displays"), function)(self, **options))
+        return cast("Display", getattr(_sources[0](), function)(self, **options))
 
     def _picture(self) -> str:
         """Return the picture as HTML, below what else is shown; empty where there is none."""
-        try:
-            return self._made("picture_of")._repr_html_()
-        except BlocksimError:
-            return ""
+        return str(_sources[0]().html_of(self))

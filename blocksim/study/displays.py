@@ -11,10 +11,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from blocksim import __version__
 from blocksim.analysis.compare import Comparison
 from blocksim.analysis.metrics import Judgement
-from blocksim.errors import InvalidInputError
+from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.notebook import Shown
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation import Result, files
@@ -161,6 +160,14 @@ def picture_of(shown: Any, *, kind: str | None = None, **options: Any) -> Pictur
     return PictureDisplay(kept[-1], asked.paper.dots)
 
 
+def html_of(shown: Any) -> str:
+    """Return the picture of something as HTML; empty where there is none."""
+    try:
+        return picture_of(shown)._repr_html_()
+    except BlocksimError:
+        return ""
+
+
 def animation_of(shown: Any, **options: Any) -> AnimationDisplay:
     """Return an animation of a run. Raises as `blocksim.animate`, and InvalidInputError for anything else."""
     run = _subject(shown)
@@ -186,7 +193,7 @@ def page_of(shown: Any, *, experiment: Path | str | None = None) -> PageDisplay:
     parts, problems = report.subjects_of([subject], table)
     if problems:
         raise InvalidInputError("\n".join(problems))
-    return PageDisplay(page.page_text(parts, title=report.title_of(parts), version=__version__))
+    return PageDisplay(page.page_text(parts, title=report.title_of(parts)))
 
 
 def _subject(shown: Any) -> Any:

@@ -22,7 +22,6 @@ from socketserver import ThreadingMixIn
 from typing import Any
 from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
 
-from blocksim import __version__
 from blocksim.errors import BlocksimError
 from blocksim.simulation import files
 from blocksim.study import report, run_folder
@@ -111,7 +110,7 @@ class LivePage:
                 parts = [subjects.run_subject("part-1", replace(subjects.read_folder(self.folder), problems=()))]
         except BlocksimError:
             return ""
-        return page.page_text(parts, title=report.title_of(parts), version=__version__)
+        return page.page_text(parts, title=report.title_of(parts))
 
 
 @cache

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from blocksim import __version__
 from blocksim.analysis.compare import Comparison
 from blocksim.analysis.metrics import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
@@ -49,7 +48,7 @@ def report_on(
     Raises what finding and reading them raises, and OutputError.
     """
     shown, problems = subjects_of(places, experiment, members, on_remark)
-    return page.write_report(shown, out, title=title_of(shown), version=__version__), problems
+    return page.write_report(shown, out, title=title_of(shown)), problems
 
 
 def title_of(shown: Sequence[parts.Subject]) -> str:
@@ -65,13 +64,13 @@ def page_of_result(result: Result, experiment: Path | None = None) -> str:
         Path(result.name), result.scenario, text, result.summary, result.frames, result.columns, probes=result.probes
     )
     shown = [parts.run_subject("part-1", run, *_compared(run, experiment))]
-    return page.page_text(shown, title=title_of(shown), version=__version__)
+    return page.page_text(shown, title=title_of(shown))
 
 
 def page_of_study(result: answer.UnstoredResult) -> str:
     """Return the text of the page of a result of a study in memory."""
     shown = [parts.study_subject("part-1", answer.page_of(result, result.scenario), "")]
-    return page.page_text(shown, title=title_of(shown), version=__version__)
+    return page.page_text(shown, title=title_of(shown))
 
 
 def subjects_of(

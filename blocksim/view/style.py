@@ -100,8 +100,7 @@ def picture_path(path: Path | str) -> Path:
     return path
 
 
-are_docstrings_read = True
-"""Whether somebody may read docstrings of matplotlib in this process; a command, in which nobody does, sets it."""
+are_docstrings_read = True  # those of matplotlib, in this process; not in that of a command, which says so
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from blocksim.scenario.overrides import KeyPath, format_key
+from blocksim.simulation import provenance
 from blocksim.simulation.files import write_bytes
 from blocksim.view.report.subjects import Subject
 
@@ -20,18 +21,18 @@ MOST_KEYS = 2  # in a label
 UNTOLD = {"name", "description", "experiment", "provenance"}
 
 
-def write_report(subjects: Sequence[Subject], path: Path, *, title: str, version: str) -> int:
+def write_report(subjects: Sequence[Subject], path: Path, *, title: str) -> int:
     """Write subjects, the members of sweeps among them, into one file; return its size in bytes.
 
     Raises OutputError.
     """
-    text = page_text(subjects, title=title, version=version)
+    text = page_text(subjects, title=title)
     content = text.encode(errors="replace")  # names of folders may not be valid text
     write_bytes(path, content)
     return len(content)
 
 
-def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
+def page_text(subjects: Sequence[Subject], *, title: str) -> str:
     """Return the text of the page; those subjects that have a parent are reached from it only."""
     listed = [subject for subject in subjects if not subject.page.get("parent")]
     names = ("style.css", *(f"{name}.js" for name in SCRIPTS))
@@ -39,9 +40,9 @@ def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
     # all scripts as one, whose names are seen by nothing else in the page
     script = '\n(() => {\n"use strict";\n' + "\n".join(scripts) + "\n})();\n"
     policy = policy_of(style, script)
-    told = {"title": title, "version": version, "subjects": subjects, "listed": listed, "labels": labels(listed)}
+    told = {"title": title, "subjects": subjects, "listed": listed, "labels": labels(listed)}
     page = _environment().get_template("page.html")
-    return str(page.render(**told, policy=policy, style=style, script=script))
+    return str(page.render(**told, version=provenance.code_version(), policy=policy, style=style, script=script))
 
 
 def policy_of(style: str, script: str, *more: str) -> str:
