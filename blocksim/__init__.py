@@ -16,7 +16,7 @@ Scenarios: `load` (a file or dictionaries), `replace` (change keys, validated). 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from blocksim.notebook import draw_with
+from blocksim.notebook import DISPLAYS
 
 if TYPE_CHECKING:
     from blocksim.scenario import load_scenario as load, replace_values as replace
@@ -68,7 +68,7 @@ _HOMES = {
     "replace": ("scenario", "replace_values"),
 }
 
-draw_with(lambda: import_module("blocksim.study.displays"))
+DISPLAYS.append(lambda: import_module("blocksim.study.displays"))
 
 
 def __getattr__(name: str) -> Any:

@@ -4,10 +4,8 @@ It is light, as the package imports it.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol, cast
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from pathlib import Path
+from typing import Any, Protocol, cast
 
 
 class Display(Protocol):
@@ -18,7 +16,7 @@ class Display(Protocol):
         """The figure of matplotlib; None for animations and pages."""
         ...
 
-    def save(self, path: "Path | str", *, overwrite: bool = False) -> "Path":
+    def save(self, path: Path | str, *, overwrite: bool = False) -> Path:
         """Write it in the format that the suffix names. Raises InvalidInputError, OutputExistsError, OutputError."""
         ...
 
@@ -27,12 +25,7 @@ class Display(Protocol):
     def _repr_html_(self) -> str: ...
 
 
-_sources: list[Callable[[], Any]] = []
-
-
-def draw_with(source: Callable[[], Any]) -> None:
-    """Register what gives the functions of blocksim.study.displays; it is asked when a result is first drawn."""
-    _sources[:] = [source]
+DISPLAYS: list[Callable[[], Any]] = []  # gives the functions of blocksim.study.displays when a result is first drawn
 
 
 class Shown:
@@ -49,17 +42,13 @@ class Shown:
         """Return an animation, of a run; options are those of `blocksim.animate`. Raises InvalidInputError."""
         return self._made("animation_of", **options)
 
-    def report(self, experiment: "Path | str | None" = None) -> Display:
+    def report(self, experiment: Path | str | None = None) -> Display:
         """Return the page of `blocksim.report`. Raises InvalidInputError, also for what is damaged in a folder."""
         return self._made("page_of", experiment=experiment)
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        return self._picture()
+        """Return what a notebook shows: the picture, or nothing where there is none; results put more above it."""
+        return str(DISPLAYS[0]().html_of(self))
 
     def _made(self, function: str, **options: Any) -> Display:
-        return cast("Display", getattr(_sources[0](), function)(self, **options))
-
-    def _picture(self) -> str:
-        """Return the picture as HTML, below what else is shown; empty where there is none."""
-        return str(_sources[0]().html_of(self))
+        return cast("Display", getattr(DISPLAYS[0](), function)(self, **options))

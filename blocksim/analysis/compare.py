@@ -151,7 +151,7 @@ class Comparison(Shown):
 
     def _repr_html_(self) -> str:
         """Return the same line above the table and the picture of the end, for notebooks."""
-        return html_of(self, self.to_frame()) + self._picture()
+        return html_of(self, self.to_frame()) + super()._repr_html_()
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON; a missing number is None."""

@@ -349,7 +349,7 @@ class Judgement(Shown):
 
     def _repr_html_(self) -> str:
         """Return the same line above the samples inside the measured limits, and the sweep, for notebooks."""
-        return compare.html_of(self, self.to_frame()) + self._picture()
+        return compare.html_of(self, self.to_frame()) + super()._repr_html_()
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON, with the meaning of each; a missing number is None."""

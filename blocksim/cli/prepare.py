@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.cli import app, command_line, output
+from blocksim.cli import command_line, output
 from blocksim.errors import ScenarioError
 from blocksim.options import Option
 from blocksim.scenario import Document, Scenario, check, mistakes
@@ -78,11 +78,7 @@ def announce_compilation(kernels: str, *, quiet: bool) -> None:
     from blocksim.kernels.common import jit
     from blocksim.simulation.schemes import compile_kernels, is_compiled
 
-    if is_compiled(kernels):
-        with app.pause_collector():
-            compile_kernels(kernels)
-        return
-    if quiet:
+    if quiet or is_compiled(kernels):
         compile_kernels(kernels)
         return
     output.note("Compiling the solver, once after installation (less than a minute) ...")

@@ -107,9 +107,8 @@ def _bar(first: str, *others: str) -> "Progress":
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    texts = map(TextColumn, others)
-    bar = BarColumn(bar_width=None)
-    return Progress(TextColumn(first), bar, *texts, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+    columns = TextColumn(first), BarColumn(bar_width=None), *map(TextColumn, others), TimeRemainingColumn()
+    return Progress(*columns, console=Console(stderr=True), transient=True)
 
 
 def one_by_one(items: Sequence[T], told: Callable[[T], str], *, quiet: bool) -> Iterator[T]:

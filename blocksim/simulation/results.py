@@ -188,7 +188,7 @@ class Result(Shown):
         """Return the same line above the final table and picture, for notebooks."""
         line = f"{self.name}: {self.status} ({self.reason}), {self.summary.simulated_time_s:.4g} s simulated"
         table: str = self.final.to_html(index=False, max_rows=MOST_ROWS, float_format="{:.2f}".format)
-        return f"<p>{escape(line)}</p>{table}{self._picture()}"
+        return f"<p>{escape(line)}</p>{table}{super()._repr_html_()}"
 
     @property
     def status(self) -> str:

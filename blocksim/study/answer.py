@@ -94,7 +94,7 @@ class StudyResult(Shown):
         head = "".join(f"<th>{escape(one)}</th>" for one in told.heads)
         lines = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in told.texts())
         notes = "".join(f"<p>{escape(line)}</p>" for line in (*told.lines, *told.notes))
-        return f"<p>{escape(told.title)}</p><table><tr>{head}</tr>{lines}</table>{notes}{self._picture()}"
+        return f"<p>{escape(told.title)}</p><table><tr>{head}</tr>{lines}</table>{notes}{super()._repr_html_()}"
 
 
 class UnstoredResult(StudyResult):

@@ -112,7 +112,7 @@ class CapacityAnswer(Shown):
 
     def _repr_html_(self) -> str:
         """Return the same line, the table and the picture, for notebooks."""
-        return f"<p>{escape(repr(self)[1:-1])}</p>{self.to_frame().to_html(index=False)}{self._picture()}"
+        return f"<p>{escape(repr(self)[1:-1])}</p>{self.to_frame().to_html(index=False)}{super()._repr_html_()}"
 
 
 def capacity(run: Result | Path | str) -> CapacityAnswer:

@@ -193,7 +193,7 @@ def page_of(shown: Any, *, experiment: Path | str | None = None) -> PageDisplay:
     parts, problems = report.subjects_of([subject], table)
     if problems:
         raise InvalidInputError("\n".join(problems))
-    return PageDisplay(page.page_text(parts, title=report.title_of(parts)))
+    return PageDisplay(page.page_text(parts))
 
 
 def _subject(shown: Any) -> Any:

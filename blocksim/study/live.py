@@ -110,7 +110,7 @@ class LivePage:
                 parts = [subjects.run_subject("part-1", replace(subjects.read_folder(self.folder), problems=()))]
         except BlocksimError:
             return ""
-        return page.page_text(parts, title=report.title_of(parts))
+        return page.page_text(parts)
 
 
 @cache

@@ -302,7 +302,7 @@ class SweepResult(Shown):
     def _repr_html_(self) -> str:
         """Return the same line above the table and the picture that suits it, for notebooks."""
         table = self.table.to_html(index=False, max_rows=MOST_ROWS)
-        return f"<p>{escape(repr(self)[1:-1])}</p>{table}{self._picture()}"
+        return f"<p>{escape(repr(self)[1:-1])}</p>{table}{super()._repr_html_()}"
 
     @property
     def keys(self) -> tuple[str, ...]:

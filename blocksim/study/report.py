@@ -48,13 +48,7 @@ def report_on(
     Raises what finding and reading them raises, and OutputError.
     """
     shown, problems = subjects_of(places, experiment, members, on_remark)
-    return page.write_report(shown, out, title=title_of(shown)), problems
-
-
-def title_of(shown: Sequence[parts.Subject]) -> str:
-    """Return the title of a page, after those of its subjects that no other one leads to."""
-    names = dict.fromkeys(subject.name for subject in shown if not subject.page.get("parent"))
-    return f"{', '.join(names)} – blocksim report"
+    return page.write_report(shown, out), problems
 
 
 def page_of_result(result: Result, experiment: Path | None = None) -> str:
@@ -63,14 +57,12 @@ def page_of_result(result: Result, experiment: Path | None = None) -> str:
     run = parts.PartialRun(
         Path(result.name), result.scenario, text, result.summary, result.frames, result.columns, probes=result.probes
     )
-    shown = [parts.run_subject("part-1", run, *_compared(run, experiment))]
-    return page.page_text(shown, title=title_of(shown))
+    return page.page_text([parts.run_subject("part-1", run, *_compared(run, experiment))])
 
 
 def page_of_study(result: answer.UnstoredResult) -> str:
     """Return the text of the page of a result of a study in memory."""
-    shown = [parts.study_subject("part-1", answer.page_of(result, result.scenario), "")]
-    return page.page_text(shown, title=title_of(shown))
+    return page.page_text([parts.study_subject("part-1", answer.page_of(result, result.scenario), "")])
 
 
 def subjects_of(

@@ -108,8 +108,7 @@ def open_figure(width: float, height: float, dots: float | None = None) -> Itera
     """Give an empty figure of `width` x `height` inches, in this style; needs no display. `dots` are those an inch."""
     from matplotlib import artist
 
-    if not are_docstrings_read:
-        # lists of properties, a quarter of what importing the rest takes
+    if not are_docstrings_read:  # they list properties: a quarter of what importing the rest takes
         artist.kwdoc = lambda _: ""  # type: ignore[assignment]  # an argument without a name
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -78,7 +78,7 @@ def test_polygons_have_their_corners_and_are_found_under_the_pointer(tmp_path: P
     frames = write_run(tmp_path / "run", count=3)
     wedge = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02))
     stored = replace(read_folder(tmp_path / "run"), frames=polygons(frames, wedge))
-    write_report([run_subject("part-1", stored)], tmp_path / "report.html", title="wedges")
+    write_report([run_subject("part-1", stored)], tmp_path / "report.html")
     one = open_page(tmp_path / "report.html")
     one.page.evaluate(f"{PLAYER}.toggle('names')")
     scale = one.state()["scale"]
@@ -114,7 +114,7 @@ def test_blocks_that_an_event_removed_are_neither_drawn_nor_found(tmp_path: Path
     vx = stored.frames.vx.copy()
     vx[10:, 2] = np.nan
     subject = run_subject("part-1", replace(stored, frames=replace(stored.frames, vx=vx)))
-    write_report([subject], tmp_path / "report.html", title="gone")
+    write_report([subject], tmp_path / "report.html")
     one = open_page(tmp_path / "report.html")
     for frame, is_there in ((9, True), (10, False)):
         one.page.evaluate(f"{PLAYER}.show({frame})")
@@ -411,7 +411,7 @@ def test_tables_and_pictures_wider_than_a_phone_say_that_they_scroll(tmp_path: P
     stored = read_folder(tmp_path / "run")
     study = StudyPage("study", "", [], "Title", ("head",), [("cell",)], picture=sheet_png())
     subjects = [study_subject("part-2", study, "study"), run_subject("part-1", stored)]
-    write_report(subjects, tmp_path / "report.html", title="wide")
+    write_report(subjects, tmp_path / "report.html")
     phone = {"viewport": {"width": 390, "height": 740}, "is_mobile": True, "has_touch": True}
     hint = "(node) => [node.scrollWidth > node.clientWidth, getComputedStyle(node, '::before').content !== 'none']"
     for options, expected in ((phone, True), ({}, False)):

@@ -110,7 +110,7 @@ def test_a_report_shows_the_probes_of_a_run(tmp_path: Path) -> None:
     probes = [{"kind": "force", "on": "supports", "name": "base"}]
     simulate_into(scene("nonsmooth", probes, 0.02), tmp_path / "run")
     stored = read_folder(tmp_path / "run")
-    text = page_text([run_subject("a", stored)], title="")
+    text = page_text([run_subject("a", stored)])
     assert "base: force, 3 samples to 0.02 s, in probe-base.csv" in text
     assert 'src="data:image/png;base64,iVBOR' in text
     assert np.isfinite(stored.probes["base"]["fy"]).all()

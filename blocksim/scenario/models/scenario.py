@@ -102,7 +102,7 @@ class Scenario(Shown, Table):
             cells = name, size, f"{block.depth:g} m deep", block.material
             rows += f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
         values = f"<details><summary>all values</summary><pre>{escape(scenario_to_toml(self))}</pre></details>"
-        return f"<p>{escape(repr(self)[1:-1])}</p><table>{rows}</table>{values}{self._picture()}"
+        return f"<p>{escape(repr(self)[1:-1])}</p><table>{rows}</table>{values}{super()._repr_html_()}"
 
 
 def json_schema() -> dict[str, Any]:

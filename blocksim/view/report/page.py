@@ -21,20 +21,21 @@ MOST_KEYS = 2  # in a label
 UNTOLD = {"name", "description", "experiment", "provenance"}
 
 
-def write_report(subjects: Sequence[Subject], path: Path, *, title: str) -> int:
+def write_report(subjects: Sequence[Subject], path: Path) -> int:
     """Write subjects, the members of sweeps among them, into one file; return its size in bytes.
 
     Raises OutputError.
     """
-    text = page_text(subjects, title=title)
+    text = page_text(subjects)
     content = text.encode(errors="replace")  # names of folders may not be valid text
     write_bytes(path, content)
     return len(content)
 
 
-def page_text(subjects: Sequence[Subject], *, title: str) -> str:
+def page_text(subjects: Sequence[Subject]) -> str:
     """Return the text of the page; those subjects that have a parent are reached from it only."""
     listed = [subject for subject in subjects if not subject.page.get("parent")]
+    title = f"{', '.join(dict.fromkeys(subject.name for subject in listed))} – blocksim report"
     names = ("style.css", *(f"{name}.js" for name in SCRIPTS))
     style, *scripts = ((PARTS / name).read_text(encoding="utf-8") for name in names)
     # all scripts as one, whose names are seen by nothing else in the page

@@ -22,14 +22,14 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
     stored = read_folder(tmp_path / "run")
     assert stored.frames is not None
     table = CaseTable(Path("t"), ("case", "status", "1.x_mm"), (("1", "1", "1.0"),))
-    clean = page_text([run_subject("a", stored), sweep_subject("b", table, None, {})], title="")
+    clean = page_text([run_subject("a", stored), sweep_subject("b", table, None, {})])
     tags = r"<(?:script|img|!--)"
     for name in HOSTILE:
         frames = replace(stored.frames, names=(name, "2", "3"))
         run = replace(stored, frames=frames, scenario_text=name, problems=(name,))
         table = CaseTable(Path(name[:100]), ("case", "status", f"{name}.x_mm"), ((name, name, "1.0"),))
         subjects = [replace(run_subject("a", run), name=name), sweep_subject("b", table, None, {})]
-        text = page_text(subjects, title=name)
+        text = page_text(subjects)
         assert len(re.findall(tags, text)) == len(re.findall(tags, clean)), name
         found = re.search(r'id="a-data">(.*?)</script>', text, re.DOTALL)
         assert found
@@ -38,7 +38,7 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
 
 def test_page_runs_nothing_but_its_own_script_and_style(tmp_path: Path) -> None:
     write_run(tmp_path / "run", count=2)
-    text = page_text([run_subject("a", read_folder(tmp_path / "run"))], title="")
+    text = page_text([run_subject("a", read_folder(tmp_path / "run"))])
     (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
     allowed = dict(part.split(" ", 1) for part in unescape(policy).split("; "))
     own = {
@@ -66,7 +66,7 @@ def test_runs_of_one_name_are_labelled_with_the_keys_that_differ(tmp_path: Path)
         "a": "gravity = 9.81, friction.block_block.static = 0.3",
         "b": "gravity = 1.62, friction.block_block.static = 0.5",
     }
-    assert "gravity = 1.62, friction.block_block.static = 0.5" in page_text([one, other], title="")
+    assert "gravity = 1.62, friction.block_block.static = 0.5" in page_text([one, other])
 
 
 def test_report_names_the_outcome_and_the_block_that_moved_first(tmp_path: Path) -> None:
@@ -104,7 +104,7 @@ def test_ledger_has_all_entries_that_are_not_zero_and_no_empty_cell(tmp_path: Pa
     subject = run_subject("part-1", replace(stored, summary=summary))
     names = [name for name, _ in subject.page["ledger"]]
     assert names == ["sand kinetic", "kinetic", "potential", "taken by events", "at the start", "in play", "residual"]
-    text = page_text([subject], title="a")
+    text = page_text([subject])
     table = text.partition('<table class="ledger">')[2].partition("</table>")[0]
     assert table.count("<tr>") == len(names)
     assert "−0.25</td>" in table
