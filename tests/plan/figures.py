@@ -137,6 +137,7 @@ def one_neighbour(modules: list[Module]) -> list[str]:
         name
         for name, others in importers.items()
         if len(others) == 1
+        and name != "blocksim.cli.app"  # the script `blocksim` imports it too
         and by_name[name].folder == by_name[min(others)].folder
         and "__init__" not in by_name[name].path
     )
