@@ -11,6 +11,7 @@ from typing import Any
 
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.compiler import compiling
+from blocksim.scenario import Model
 
 JOBS = 2
 DONE = "sets-of-tests"  # the mark of a cache that has all sets
@@ -47,7 +48,7 @@ def _run_smallest(name: str) -> None:
         SCHEMES,
         SMALLEST_SCENE,
         Team,
-        build_scene,
+        build,
         compile_kernels,
     )
     from blocksim.simulation.schemes.explicit import PARTICLES, SURFACE_OF_OUTLINES  # noqa: PLC0415
@@ -58,18 +59,18 @@ def _run_smallest(name: str) -> None:
     change: dict[str, Any] = next(dict(one.kernel_sets[name]) for one in SCHEMES.values() if name in one.kernel_sets)
     scene = scenario_from_mapping({**SMALLEST_SCENE, **change, "time": {**change.get("time", {}), "end": 1e-4}})
     with Team(2) as team:
-        team.advance(build_scene(scene), 1)
+        team.advance(build(Model(scene)), 1)
     run_ensemble([scene, scene])
 
 
 def _run_soil() -> None:
-    from blocksim.simulation.schemes import ALONE, Team, build_scene, measure_row  # noqa: PLC0415  # noqa: PLC0415
+    from blocksim.simulation.schemes import ALONE, Team, build, measure_row  # noqa: PLC0415  # noqa: PLC0415
     from tests.soils import column, scene  # noqa: PLC0415
 
     soil = scene(column(0.05, 0.05, 0.005), end=1e-4)
-    measure_row(ALONE.advance(build_scene(soil), 1)[0])
+    measure_row(ALONE.advance(build(Model(soil)), 1)[0])
     with Team(2) as team:
-        team.advance(build_scene(soil), 1)
+        team.advance(build(Model(soil)), 1)
 
 
 def _use_particles() -> None:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis.internal.conjecture import providers
 
 from blocksim.kernels.common.arrays import World
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Model, load_scenario
 from blocksim.verification.scene import CaseScene, PaperBlock, Simulation
 from blocksim.world.build import build_world
 from tests import site
@@ -77,7 +77,7 @@ def start_shipped() -> Callable[..., Simulation]:
 
     def start_file(name: str, **values: object) -> Simulation:
         overrides = {key.replace("__", "."): value for key, value in values.items()}
-        return Simulation(build_world(load_scenario(SCENARIOS / f"{name}.toml", overrides)))
+        return Simulation(build_world(Model(load_scenario(SCENARIOS / f"{name}.toml", overrides))))
 
     return start_file
 

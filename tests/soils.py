@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.simulation.schemes import build_scene, ledger_names
+from blocksim.scenario import Model, Scenario, scenario_from_mapping
+from blocksim.simulation.schemes import build, ledger_names
 from blocksim.verification.scene import Simulation
 
 DEPTH = 0.05
@@ -58,7 +58,7 @@ class Soil(Simulation):
 
     def __init__(self, scenario: Scenario) -> None:
         """Build and start it."""
-        super().__init__(build_scene(scenario))
+        super().__init__(build(Model(scenario)))
 
     @property
     def soils(self) -> Any:

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode
-from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, scenario_from_mapping
 from blocksim.scenario.models.timeline import IMPULSES, Nonsmooth
 from blocksim.simulation import loop, provenance
-from blocksim.simulation.schemes import ALONE, AnyScene, Team, build_scene
+from blocksim.simulation.schemes import ALONE, AnyScene, Team, build
 from blocksim.world.build import arrays_of
 
 Table = Mapping[str, object]
@@ -115,7 +115,7 @@ class Rerun:
 
     def __init__(self, scenario: Scenario, shift: NDArray[np.float64] | float = 0.0) -> None:
         """Build the scene with its blocks shifted along x (m), and keep its state."""
-        scene = build_scene(scenario)
+        scene = build(Model(scenario))
         scene.world.bodies.x[:-1] += shift
         self.scene, _ = ALONE.advance(scene, 0)
         self.step = float(self.scene.world.controls[0].step)  # s

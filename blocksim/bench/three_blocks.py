@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.bench import harness
-from blocksim.scenario import Scenario
+from blocksim.scenario import Model, Scenario
 from blocksim.scenario.models.timeline import IMPULSES, SPRINGS
 from blocksim.scenario.structures.base import draws
 from blocksim.simulation.ensemble import Ensemble, run_ensemble
@@ -48,24 +48,24 @@ def measure_ensemble(effort: harness.Effort) -> harness.Readings:
     return harness.Readings(tuple(numbers), notes=(note,))
 
 
-def scatter_friction(count: int, scheme: str) -> list[Scenario]:
+def scatter_friction(count: int, scheme: str) -> list[Model]:
     """Return three blocks with different friction, by the converged setting of a scheme."""
     contact, stepping, _ = SETTINGS[scheme]
     scatter = SCATTER * (2.0 * draws(SEED, count, len(harness.FRICTION)) - 1.0)
     values = np.array([*harness.FRICTION.values()]) * (1.0 + scatter)
     return [
-        harness.three_blocks(contact, stepping, dict(zip(harness.FRICTION, row, strict=True)))
+        Model(harness.three_blocks(contact, stepping, dict(zip(harness.FRICTION, row, strict=True))))
         for row in values.tolist()
     ]
 
 
-def rates(members: Sequence[Scenario], threads: int, repeats: int) -> tuple[harness.Number, harness.Number]:
+def rates(members: Sequence[Model], threads: int, repeats: int) -> tuple[harness.Number, harness.Number]:
     """Return collapses per CPU second, and per second of the clock."""
     run_ensemble(members[:1])  # compiles what single runs do not need
     clock: list[float] = []
 
     def sample() -> float:
-        ensemble = Ensemble(members, only_stack(build_stacks(members)), peaks=False)
+        ensemble = Ensemble(members, only_stack(build_stacks(members)).scenes, peaks=False)
         with ThreadPoolExecutor(threads) as pool:
             cpu, began = time.process_time(), time.perf_counter()
             ensemble.advance(pool, threads)
@@ -184,7 +184,7 @@ def measure_nonsmooth(effort: harness.Effort) -> harness.Readings:
     numbers, ends = [], []
     for restitution, level in ((0.0, without), (harness.RESTITUTION, cheapest)):
         scenario = harness.three_blocks({"restitution": restitution}, {"scheme": IMPULSES, **level.setting})
-        together, _ = rates([scenario] * members, 1, effort.repeats)
+        together, _ = rates([Model(scenario)] * members, 1, effort.repeats)
         name, (_, two, three) = f"e = {restitution:g}", 1e3 * level.centres[0]
         numbers += [
             level.number(f"{name}: alone"),

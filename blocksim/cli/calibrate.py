@@ -7,6 +7,7 @@ from functools import partial
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import ExitCode
 from blocksim.options import silent
+from blocksim.scenario import Model
 from blocksim.study import calibrate, calibrate_plan
 
 TOLD_SECONDS = 2.0
@@ -28,7 +29,7 @@ def calibrate_command(
     Example: blocksim calibrate mine.toml --fit contact.restitution=0.2:0.35
     """
     document = source.document()
-    prepare.warn_of_values([document.without_sweep().build()], screen)
+    prepare.warn_of_values([Model(document.without_sweep())], screen)
     found = calibrate.calibrate(
         document,
         replace(

@@ -12,9 +12,9 @@ from blocksim.cli import command_line, output, prepare
 from blocksim.errors import InvalidInputError
 from blocksim.options import Option
 from blocksim.scenario import (
+    Model,
     PlacedBody,
     Scenario,
-    check,
     events,
     motion,
     placement,
@@ -74,22 +74,23 @@ def check_command(
     if screen.as_json:
         bodies = [{**body._asdict(), "mass": body.mass, "inertia": body.inertia} for body in description.bodies]
         data = {**asdict(replace(description, bodies=())), "bodies": bodies}
-        return command_line.Report(data={"scenario": ready.model_dump(mode="json", by_alias=True), **data})
+        return command_line.Report(data={"scenario": ready.scenario.model_dump(mode="json", by_alias=True), **data})
     if resolved:
-        return command_line.Report([scenario_to_toml(ready)])
+        return command_line.Report([scenario_to_toml(ready.scenario)])
     if screen.quiet:
         return command_line.Report()
     tables = [list(_summary(ready, description))]
     if description.bodies:
-        tables += [_bodies(description.bodies), _pairs(ready, description.pairs), _rules(description.pairs)]
+        tables += [_bodies(description.bodies), _pairs(ready.scenario, description.pairs), _rules(description.pairs)]
     lines = "\n\n".join("\n".join(table) for table in tables)
-    warnings = [*check.implausible_values(ready), *description.warnings, *of_table]
-    notes = [*(f"warning: {text}" for text in warnings), f"{ready.name}: valid"]
+    warnings = [*ready.implausible_values, *description.warnings, *of_table]
+    notes = [*(f"warning: {text}" for text in warnings), f"{ready.scenario.name}: valid"]
     return command_line.Report([lines], notes=notes)
 
 
-def _summary(scenario: Scenario, description: describe.Description) -> Iterator[str]:
+def _summary(model: Model, description: describe.Description) -> Iterator[str]:
     """Yield time step, cost and size, and everything that acts, happens or is recorded."""
+    scenario = model.scenario
     yield f"time step  {description.step:.3e} s, at most {description.steps} steps"
     yield from _limits(description.limits)
     rigid = description.rigid
@@ -104,12 +105,12 @@ def _summary(scenario: Scenario, description: describe.Description) -> Iterator[
         if rigid.warning:
             yield f"warning: {rigid.warning}"
     yield from _unscaled(scenario, description.bodies)
-    yield from _statics(scenario, description.bodies)
+    yield from _statics(model)
     until_rest = ", less if it stops at rest" if scenario.time.stop_at_rest else ""
     yield f"solving    at most about {output.duration(description.seconds)} on one core{until_rest}"
     program = free_memory.readable(memory.PROCESS_BYTES)
     yield f"memory     about {free_memory.readable(description.memory)}, of which {program} for the program itself"
-    size = description.bytes + bytes_of_series(scenario, description.steps, description.step, memory.FRAME_VALUES)
+    size = description.bytes + bytes_of_series(model, description.steps, description.step, memory.FRAME_VALUES)
     yield f"results    at most {description.frames} frames, about {free_memory.readable(size)}"
     if description.frames_at_every_step:
         yield f"           output.every = {scenario.output.every:.3g} s is shorter than a step: a frame at every step"
@@ -118,7 +119,7 @@ def _summary(scenario: Scenario, description: describe.Description) -> Iterator[
         peaks = f"{output.number(MILLI * support.displacement)} mm, {output.number(MILLI * support.speed)} mm/s"
         greatest = f"at most {peaks} and {output.number(support.acceleration / units.STANDARD_GRAVITY)} g"
         yield f"supports   move {greatest}; {output.number(MILLI * support.final_speed)} mm/s at the end"
-    yield from _acting(scenario, description.bodies, description.step)
+    yield from _acting(model, description.step)
     if rigid is None:
         yield f"boundary   {description.particles} particles ({_use_of_particles(scenario)})"
     yield from (f"{name:<10} {count} particles or elements" for name, count in description.systems.items())
@@ -152,12 +153,12 @@ def _limits(limits: describe.StepLimits | None) -> list[str]:
     return [f"           {steps}", f"warning: because of the {who} {more}:", f"         {cure}"]
 
 
-def _statics(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:
+def _statics(model: Model) -> Iterator[str]:
     """Yield whether an equilibrium of the blocks is possible as they are placed, where statics has an answer."""
-    if len(placed) > MOST_BLOCKS:
+    if len(model.bodies) > MOST_BLOCKS:
         return
     with suppress(InvalidInputError):
-        blocks = Blockwork.of(scenario)
+        blocks = Blockwork.of(model)
         from blocksim.statics.programme import horizontal_margin
 
         margins = horizontal_margin(blocks)
@@ -203,12 +204,13 @@ def _use_of_particles(scenario: Scenario) -> str:
             return f"at most {output.number(MILLI * contact.particle_spacing)} mm apart"
 
 
-def _acting(scenario: Scenario, placed: Sequence[PlacedBody], step: float) -> Iterator[str]:
+def _acting(model: Model, step: float) -> Iterator[str]:
     """Yield lines about driven bodies, events, loads, actuators, the start and probes, the first ones of many.
 
     `step` (s) is that of the run.
     """
-    for drive in motion.drives_of(scenario):
+    scenario, placed = model.scenario, model.bodies
+    for drive in model.drives:
         spec = scenario.bodies[drive.body - len(placed) + len(scenario.bodies)]
         kind = "" if spec.motion is None else f" ({spec.motion.kind})"
         speed, spin = motion.greatest_rate(drive.shift), math.degrees(motion.greatest_rate(drive.turn))
@@ -220,13 +222,13 @@ def _acting(scenario: Scenario, placed: Sequence[PlacedBody], step: float) -> It
     yield from _some("event", [f"{at}: {events.describe_event(one)}" for at, one in zip(times, ordered, strict=True)])
     names = [load.name or f"loads.{number}" for number, load in enumerate(scenario.loads)]
     yield from _some("load", [f"{name}: {_load(load)}" for name, load in zip(names, scenario.loads, strict=True)])
-    springs = excitation.springs_of(scenario, placed, step)
+    springs = excitation.springs_of(model, step)
     jacks = zip(events.actuator_names(scenario), scenario.actuators, springs, strict=True)
     yield from _some("actuator", [f"{name}: {_actuator(one, spring)}" for name, one, (spring, _) in jacks])
     if motion.settles(scenario):
         held = f"; held: {', '.join(scenario.start.hold)}" if scenario.start.hold else ""
         yield from _some("start", [f"settles before time zero{held}"])
-    yield from _some("probe", [f"{name}: {_probe(one)}" for name, one in events.probes_of(scenario).items()])
+    yield from _some("probe", [f"{name}: {_probe(one)}" for name, one in model.probes.items()])
 
 
 def _some(head: str, lines: Sequence[str]) -> Iterator[str]:

@@ -51,14 +51,14 @@ def converge_command(
     paper = page.paper
     with source.built() as ready:
         prepare.warn_of_values([ready], screen)
-        path = out or files.RESULTS / ready.name / "converge.png"
+        path = out or files.RESULTS / ready.scenario.name / "converge.png"
         style.picture_path(path)
         if picture:
-            drawings.refuse_small_page(len(converge.refinements_of(ready, options.studies)), paper)
+            drawings.refuse_small_page(len(converge.refinements_of(ready.scenario, options.studies)), paper)
             if out is not None or path.parent.exists():  # the usual folder is made with the picture
                 files.refuse_foreign(path, overwrite=overwrite)
-        prepare.announce_compilation(schemes.kernels_of(ready), quiet=screen.silent)
-        result = converge.converge(ready, replace(options, jobs=jobs, on_run=tell))
+        prepare.announce_compilation(schemes.kernels_of(ready.scenario), quiet=screen.silent)
+        result = converge.converge(ready.scenario, replace(options, jobs=jobs, on_run=tell))
         drawn = path if picture and result.panels() else None
         if drawn is not None:
             result.draw(drawn, f"{result.name}: distance from the finest level", paper)

@@ -7,6 +7,7 @@ import typer
 
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.options import Option
+from blocksim.scenario import Model
 from blocksim.simulation.schemes import kernels_of
 from blocksim.study import answer, criterion, fragility, limit, limit_answer, limit_plan, rows
 from blocksim.study.plan import estimate_of
@@ -92,13 +93,13 @@ def limit_command(
 
 def _warn(plan: limit_plan.LimitPlan, screen: command_line.Screen) -> None:
     """Warn of implausible values of the scenario, and of those at both ends of the range; compile what it needs."""
-    ends = [plan.scenario_at(value) for value in (plan.span.low, plan.span.high)]
-    prepare.announce_compilation(kernels_of(ends[0]), quiet=screen.silent)
+    ends = [plan.model_at(value) for value in (plan.span.low, plan.span.high)]
+    prepare.announce_compilation(kernels_of(ends[0].scenario), quiet=screen.silent)
     prepare.warn_of_values(ends, screen)
     seconds = output.duration(max(LEAST_SAID, *(describe.describe(one).seconds for one in ends)))
     runs = f"about {plan.usual_runs} runs for each change in the range, {plan.most_runs} at most"
     screen.note(f"forecast: {runs}; up to {seconds} each on one core")
-    if not any(one.start.settle for one in ends) and all(map(limit_plan.is_sustained, ends)):
+    if not any(one.scenario.start.settle for one in ends) and all(map(limit_plan.is_sustained, ends)):
         screen.note(AT_ONCE)
 
 
@@ -120,11 +121,11 @@ def fragility_command(
     Example: blocksim fragility mine.toml --intensity motion.scale=0.5:2:7 --scatter friction.block_block=0.6+-0.05
     """
     plan = fragility.read_fragility(source.document(), options)
-    base = plan.document.build()
+    base = Model(plan.document)
     prepare.warn_of_values([base], screen)
     if dry_run:
         return prepare.estimate_report(estimate_of(plan.cases), options.jobs, screen)
-    prepare.announce_compilation(kernels_of(base), quiet=screen.silent)
+    prepare.announce_compilation(kernels_of(base.scenario), quiet=screen.silent)
     heads = {head.key: head for head in plan.cases.heads}
     with progress.exit_on_stop(), progress.case_progress(heads.values(), quiet=screen.silent) as on_row:
         found = fragility.run_fragility(plan, replace(options, on_row=on_row))

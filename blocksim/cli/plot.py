@@ -156,7 +156,7 @@ def export_command(
     if form.write_contacts is not None and contacts is not None:
         files.refuse_foreign(beside, overwrite=overwrite)
     older = pictures.OLDER if file.exists() else ""
-    notes = [f"file: {file} ({older}{form.write(file, stored.frames, stored.scenario)} {form.counted})"]
+    notes = [f"file: {file} ({older}{form.write(file, stored.frames, stored.model)} {form.counted})"]
     if form.write_contacts is not None and contacts is not None:
         older = pictures.OLDER if beside.exists() else ""
         notes.append(f"file: {beside} ({older}{form.write_contacts(beside, stored.frames, contacts)} contacts)")

@@ -10,7 +10,7 @@ from typing import Annotated
 from blocksim.cli import command_line, output
 from blocksim.errors import ScenarioError
 from blocksim.options import Option
-from blocksim.scenario import Document, Scenario, check, mistakes
+from blocksim.scenario import Document, Model, mistakes
 from blocksim.study import plan
 from blocksim.world.free_memory import readable
 from blocksim.world.step import SkinTooSmallError, StepError
@@ -28,21 +28,20 @@ class ScenarioInput:
         return Document.read(self.scenario).with_settings(self.settings or [])
 
     @contextmanager
-    def built(self) -> Iterator[Scenario]:
-        """Give the validated scenario; a step or skin that turns out not to fit is shown where it was written."""
+    def built(self) -> Iterator[Model]:
+        """Give what a valid scenario describes; a step or skin that does not fit is shown where it was written."""
         document = self.document()
         try:
-            yield document.build()
+            yield Model(document)
         except StepError as error:
             raise ScenarioError([document.problem(mistakes.Mistake(("time", "step"), str(error)))]) from None
         except SkinTooSmallError as error:
             raise ScenarioError([document.problem(mistakes.Mistake(("contact", "skin"), str(error)))]) from None
 
 
-def warn_of_values(scenarios: Iterable[Scenario], screen: command_line.Screen) -> list[str]:
+def warn_of_values(models: Iterable[Model], screen: command_line.Screen) -> list[str]:
     """Warn of values that are allowed but implausible, of each once, and return the warnings."""
-    found = () if screen.silent else (text for one in scenarios for text in check.implausible_values(one))
-    shown = list(dict.fromkeys(found))
+    shown = [] if screen.silent else list(dict.fromkeys(text for one in models for text in one.implausible_values))
     for text in shown:
         screen.note(f"warning: {text}")
     return shown

@@ -62,7 +62,7 @@ def run_command(
             try:
                 result = run.run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))
             except rest_state.SettleError as error:
-                held = ' --set "start.hold=[]"' * bool(ready.start.hold)
+                held = ' --set "start.hold=[]"' * bool(ready.scenario.start.hold)
                 raise rest_state.SettleError(
                     f"{error}; --set start.settle=false{held} runs it from where it is placed"
                 ) from None

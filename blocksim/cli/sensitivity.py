@@ -11,6 +11,7 @@ from typing import Annotated
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import OutputExistsError
 from blocksim.options import Option
+from blocksim.scenario import Model
 from blocksim.simulation.files import write_text
 from blocksim.study.sensitivity import INDICATOR, Indices, Sensitivity, SensitivityOptions, sensitivity
 
@@ -41,7 +42,7 @@ def sensitivity_command(
         if out.exists() and not overwrite:
             raise OutputExistsError(f"{out}: already exists; --overwrite replaces it")
     document = source.document()
-    prepare.warn_of_values([document.without_sweep().build()], screen)
+    prepare.warn_of_values([Model(document.without_sweep())], screen)
     start = partial(prepare.announce_compilation, quiet=screen.silent)
     with progress.count_progress("runs", quiet=screen.silent) as on_member:
         found = sensitivity(document, replace(options, on_start=start, on_member=on_member))

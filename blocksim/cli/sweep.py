@@ -10,7 +10,7 @@ import typer
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import ExitCode
 from blocksim.options import Option
-from blocksim.scenario import Document
+from blocksim.scenario import Document, Model
 from blocksim.simulation.observables import DISPLACEMENT, END_SPEED, FIRST_MOVED, FIRST_MOVER, MOVES_ON, OUTCOME, TURN
 from blocksim.study import manifest, plan, rows, sweep
 from blocksim.view.sweeps.data import short_names
@@ -51,7 +51,7 @@ def sweep_command(
     if scenario is None:
         raise typer.BadParameter("a scenario file is needed, or --merge DIR", param_hint="SCENARIO")
     document = options.document(Document.read(scenario).with_settings(settings or []))
-    base = document.build()
+    base = Model(document)
     prepare.warn_of_values([base], screen)
     for text in rows.check_experiment(base):
         screen.note(f"warning: {text}")
@@ -59,7 +59,7 @@ def sweep_command(
         return prepare.estimate_report(plan.estimate(document, keep_cases=options.keep_cases), options.jobs, screen)
     for kernels in sweep.kernels_for(document):
         prepare.announce_compilation(kernels, quiet=screen.silent)
-    heads = () if base.sweep is None else rows.heads_of(base.sweep)
+    heads = () if base.scenario.sweep is None else rows.heads_of(base.scenario.sweep)
     with progress.exit_on_stop(), progress.case_progress(heads, quiet=screen.silent) as on_row:
         result = sweep.run_sweep(document, replace(options, on_row=on_row))
     return _table_report(result)

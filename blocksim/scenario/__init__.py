@@ -9,25 +9,27 @@ from blocksim.scenario.document import (
     replace_values,
     scenario_from_mapping,
 )
+from blocksim.scenario.model import Model, derived
 from blocksim.scenario.models.contact import GROUND
 from blocksim.scenario.models.scenario import Scenario, json_schema
 from blocksim.scenario.models.study import Sweep
-from blocksim.scenario.placement import PlacedBody, PlacedSegment, place_bodies, place_segments
+from blocksim.scenario.placement import PlacedBody, PlacedSegment, place_segments
 from blocksim.scenario.resolution import resolve_pair, scenario_hash, scenario_to_toml
 
 __all__ = [
     "GROUND",
     "Document",
+    "Model",
     "PlacedBody",
     "PlacedSegment",
     "Scenario",
     "Source",
     "Sweep",
+    "derived",
     "document_of",
     "json_schema",
     "load_scenario",
     "load_stored",
-    "place_bodies",
     "place_segments",
     "replace_values",
     "resolve_pair",

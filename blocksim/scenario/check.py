@@ -1,11 +1,12 @@
 """Everything that must hold before a scenario may be used, and warnings of values that are hardly meant."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import cache, partial
 from itertools import islice, pairwise
 from math import ceil, dist, inf
 from pathlib import Path
 from statistics import median
-from typing import get_args
+from typing import cast, get_args
 
 from pydantic import ValidationError
 
@@ -17,6 +18,7 @@ from blocksim.scenario.structures import polygons
 from blocksim.scenario.structures.base import PolygonStructure
 
 BLOCKS_BY_NAME = ("structures", "bodies")
+WITH_NAMES = frozenset({*BLOCKS_BY_NAME, "blocks", "materials", "ground", "walls", "pairs"})  # of blocks and materials
 SPRING_CHOICES = ("model", "law")  # keys of [contact] that rigid contacts do not have
 
 
@@ -129,7 +131,7 @@ LONGEST_DRAWN = 10.0  # m, of most blocks of a drawing: bricks and stones in mm 
 MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the square of the height
 
 
-def implausible_values(scenario: Scenario, placed: Sequence[placement.PlacedBody] | None = None) -> list[str]:
+def implausible_values(scenario: Scenario, placed: Sequence[placement.PlacedBody]) -> list[str]:
     """Return a warning for each value that looks like one in another unit, of frictions swept ones too.
 
     Also for what was not read of drawings, for soils of whose width or height no whole number of particles takes all,
@@ -160,7 +162,6 @@ def implausible_values(scenario: Scenario, placed: Sequence[placement.PlacedBody
                 warnings.append(f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"')
             warnings += structure.remarks
     warnings += _friction_angles(scenario)
-    placed = placement.place_bodies(scenario) if placed is None else placed
     warnings += _impacts(scenario, placed)
     for soil in placement.soil_tables(scenario):
         extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
@@ -173,7 +174,7 @@ def implausible_values(scenario: Scenario, placed: Sequence[placement.PlacedBody
                     f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
                 )
     loose = overlap.support_warning(scenario, placed)
-    return [*warnings, *cut_off(scenario), *([loose] if loose else [])]
+    return [*warnings, *cut_off(scenario, placed), *([loose] if loose else [])]
 
 
 STRONG_RESTITUTION = 0.5  # beyond which simultaneous impacts were seen to create energy
@@ -205,10 +206,10 @@ ROUND_OFF = 1e-9  # of the end: sums of times that are meant to be equal
 MOST_NAMES = 8  # that a warning lists
 
 
-def cut_off(scenario: Scenario) -> Iterator[str]:
+def cut_off(scenario: Scenario, placed: Sequence[placement.PlacedBody]) -> Iterator[str]:
     """Yield a warning for everything that begins at the end of the run or later, or is not complete by then."""
     end, found = scenario.time.end, dict[str, list[str]]()
-    for key, begin, last in _spans(scenario):
+    for key, begin, last in _spans(scenario, placed):
         if begin >= end:
             found.setdefault(f"nothing changes before {begin:g} s", []).append(key)
         elif last > end * (1.0 + ROUND_OFF):
@@ -217,7 +218,7 @@ def cut_off(scenario: Scenario) -> Iterator[str]:
         yield f"{spelling.list_names(keys, MOST_NAMES)}: {what}, but the run ends at time.end = {end:g} s"
 
 
-def _spans(scenario: Scenario) -> Iterator[tuple[str, float, float]]:
+def _spans(scenario: Scenario, placed: Sequence[placement.PlacedBody]) -> Iterator[tuple[str, float, float]]:
     """Yield key, begin and end (s) of everything that changes over time, but what an event ends before."""
     ends: dict[str, float] = {}  # by the name of a load, an actuator or a body; at a rest that nobody knows, at once
     for event in scenario.events:
@@ -234,12 +235,11 @@ def _spans(scenario: Scenario) -> Iterator[tuple[str, float, float]]:
     for table, number, name, stretches in named:
         if moments := _moments(stretches):
             yield overrides.format_key((table, number)), moments[0], min(moments[-1], ends.get(name, inf))
-    if any(body.motion for body in scenario.bodies):
-        placed = placement.place_bodies(scenario)[-len(scenario.bodies) :]
-        for number, (body, one) in enumerate(zip(scenario.bodies, placed, strict=True)):
-            if body.motion is not None:
-                key, begin, last = _of_motion(overrides.format_key(("bodies", number, "motion")), body.motion)
-                yield key, begin, min(last, ends.get(one.name, inf))
+    single = placed[len(placed) - len(scenario.bodies) :]
+    for number, (body, one) in enumerate(zip(scenario.bodies, single, strict=True)):
+        if body.motion is not None:
+            key, begin, last = _of_motion(overrides.format_key(("bodies", number, "motion")), body.motion)
+            yield key, begin, min(last, ends.get(one.name, inf))
     for number, soil in enumerate(placement.soil_tables(scenario)):
         if soil.start == "ramp":
             yield overrides.format_key(("soils", number, "start")), 0.0, RAMP_TIME
@@ -304,16 +304,30 @@ Trial = Callable[[overrides.KeyPath, object, overrides.KeyPath], Iterator[mistak
 UNVARIED = ("schema", "name", "description", "experiment", "sweep", "provenance")
 
 
-def examine(data: overrides.Data, folder: Path) -> tuple[Scenario | None, list[mistakes.Mistake]]:
-    """Validate data (tuples for lists): the scenario, or None and all mistakes.
+def examine(
+    data: overrides.Data, folder: Path
+) -> tuple[Scenario | None, list[mistakes.Mistake], Callable[[], placement.Placement]]:
+    """Validate data (tuples for lists): the scenario, or None and all mistakes, and what gives the placed blocks.
 
     Mistakes of placement, such as overlapping bodies, can only be found once everything else is right.
     """
     scenario, findings = _validated(data, folder)
     findings += [*_sweep(data, folder), *_unknown_provenance(data)]
+    placed = cache(partial(placement.place, cast("Scenario", scenario)))
     if scenario is not None and not findings:
-        findings += [*unfit_choices(scenario), *start.impossible_starts(scenario)]
-    return (None if findings else scenario), findings
+        findings += [*unfit_choices(scenario), *start.impossible_starts(scenario, placed)]
+    return (None if findings else scenario), findings, placed
+
+
+def mistakes_among(
+    data: overrides.Data, scenario: Scenario, placed: Callable[[], placement.Placement], tables: Collection[str]
+) -> Iterator[mistakes.Mistake]:
+    """Find mistakes in how some tables, each valid, go with the others of a scenario that had none before."""
+    if not WITH_NAMES.isdisjoint(tables):
+        yield from wrong_names(data)
+    yield from _unknown_provenance(data)
+    yield from unfit_choices(scenario)
+    yield from start.impossible_starts(scenario, placed, tables)
 
 
 def _validated(data: overrides.Data, folder: Path) -> tuple[Scenario | None, list[mistakes.Mistake]]:

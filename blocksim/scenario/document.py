@@ -6,6 +6,7 @@ import functools
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple, Self, cast
@@ -13,6 +14,7 @@ from typing import NamedTuple, Self, cast
 from blocksim.errors import InputMissingError, Problem, ScenarioError
 from blocksim.scenario import check, input_files, mistakes, overrides as keys, resolution, units
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.placement import Placement
 
 MAX_SHOWN = 110
 """Characters of a line that a message shows; a longer line is cut on both sides of the caret."""
@@ -340,12 +342,20 @@ class Document:
             raise ScenarioError(problems)
         return replace(self, data=data, overrides=tuple(overrides))
 
+    def file_access(self) -> AbstractContextManager[None]:
+        """Allow the tables to be read that this document may name."""
+        return input_files.file_access(anywhere=self.allow_outside, links=not self.is_stored)
+
     def build(self) -> Scenario:
         """Validate; raises ScenarioError with every mistake, those in the file first and by line."""
-        with input_files.file_access(anywhere=self.allow_outside, links=not self.is_stored):
-            scenario, findings = check.examine(self.data, self.folder)
+        return self.examined()[0]
+
+    def examined(self) -> tuple[Scenario, Placement]:
+        """Return the same with all blocks as they were placed to validate it."""
+        with self.file_access():
+            scenario, findings, placed = check.examine(self.data, self.folder)
         if scenario is not None:
-            return scenario
+            return scenario, placed()
         problems = list(dict.fromkeys(self.problem(finding) for finding in findings))
         problems.sort(key=lambda p: (p.line_number is None, p.line_number or 0, p.caret_start))
         more = [Problem(self.source.where, "more mistakes follow")] if len(problems) > MAX_PROBLEMS else []

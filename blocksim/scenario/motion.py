@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import placement
 from blocksim.scenario.models.motion import UNITS, Baseline, FromTable, Harmonic, Pulse, Ramp, Rotation
 from blocksim.scenario.models.scenario import Scenario
 
@@ -318,7 +317,7 @@ def drives_of(scenario: Scenario) -> tuple[Drive, ...]:
     """Return the motions of all driven bodies, in the order of the bodies."""
     if all(body.motion is None for body in scenario.bodies):
         return ()
-    first, end = len(placement.place_bodies(scenario)) - len(scenario.bodies), BEYOND * scenario.time.end
+    first, end = sum(structure.size for structure in scenario.structures), BEYOND * scenario.time.end
     drives = []
     for number, body in enumerate(scenario.bodies, start=first):
         motion, centre = body.motion, (body.x, body.y)

@@ -6,7 +6,7 @@ what overhangs belong to it; the jambs of openings do not, nor does a level crow
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from blocksim.scenario import geometry, overlap, placement
 from blocksim.scenario.models.loads import BACK, FRONT, NORMALS, AnyLoad, Face, OnBody, Pressure
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.placement import PlacedBody
+from blocksim.scenario.placement import PlacedBody, Placement
 from blocksim.scenario.units import ANGLE, Quantity
 
 NO_FACE = (0.0, 0.0), (0.0, 0.0), (0.0, 1.0)
@@ -39,17 +39,18 @@ class ActingLoad(NamedTuple):
     edge: geometry.Edge = NO_FACE
 
 
-def acting_loads(scenario: Scenario, numbers: Mapping[str, int]) -> Iterator[ActingLoad]:
-    """Yield the loads of a scenario in order, those on sides of structures once a face; `numbers` of bodies by name."""
+def acting_loads(scenario: Scenario, placed: Placement) -> Iterator[ActingLoad]:
+    """Yield the loads of a scenario in order, those on sides of structures once a face."""
+    numbers = {body.name: number for number, body in enumerate(placed.bodies)} if scenario.loads else {}
     for load in scenario.loads:
         if not isinstance(load, OnBody):
             yield ActingLoad(load)
         elif load.body is None:
-            yield from (ActingLoad(load, *one) for one in faces_under(scenario, load))
+            yield from (ActingLoad(load, *one) for one in faces_under(scenario, load, placed))
         else:
             number, edge = numbers[load.body], NO_FACE
             if isinstance(load, Pressure):
-                edge = face_of(placement.place_bodies(scenario)[number].corners, load.face) or NO_FACE
+                edge = face_of(placed.bodies[number].corners, load.face) or NO_FACE
             yield ActingLoad(load, number, edge)
 
 
@@ -82,28 +83,27 @@ def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
     return body._replace(size_x=size_x, size_y=thickness, x=x, y=y, angle=angle, outline=())
 
 
-def faces_under(scenario: Scenario, load: Pressure) -> list[OpenFace]:
+def faces_under(scenario: Scenario, load: Pressure, placed: Placement) -> Sequence[OpenFace]:
     """Return the faces of a structure on which a pressure acts, in the order of its bodies."""
-    _, placed, origins, sides = placement.placement_of(scenario)
+    bodies, origins, sides = placed
     structure = load.structure or 0
-    side = structure, side_of(scenario, load)
+    side = structure, side_of(scenario, load, placed)
     if side not in sides:
         own = [number for number, origin in enumerate(origins) if origin == ("structures", structure - 1)]
-        sides[side] = [*_open_faces(scenario, placed, own, side[1])] if own else []
-    faces: list[OpenFace] = sides[side]
+        sides[side] = tuple(_open_faces(scenario, bodies, own, side[1])) if own else ()
+    faces: tuple[OpenFace, ...] = sides[side]
     return faces
 
 
-def side_of(scenario: Scenario, load: Pressure) -> float:
+def side_of(scenario: Scenario, load: Pressure, placed: Placement) -> float:
     """Return 1.0 for the right side of a structure, -1.0 for the left one.
 
     Its back is where most soils are, on the left where there are none: what is pushed over falls to its front.
     """
     if load.face not in (BACK, FRONT):
         return NORMALS[str(load.face)][0]
-    _, placed, origins, _ = placement.placement_of(scenario)
     of_structure = ("structures", (load.structure or 0) - 1)
-    own = [body.x for body, origin in zip(placed, origins, strict=True) if origin == of_structure]
+    own = [body.x for body, origin in zip(placed.bodies, placed.origins, strict=True) if origin == of_structure]
     middle = 0.5 * (min(own) + max(own)) if own else 0.0
     soils = [float(soil.corners[:, 0].mean()) for soil in placement.soil_tables(scenario)]
     back = 1.0 if sum(math.copysign(1.0, place - middle) for place in soils) > 0.0 else -1.0

@@ -1,7 +1,6 @@
 """From a declared scenario to placed blocks and straight pieces of boundary."""
 
 import math
-import weakref
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -109,25 +108,16 @@ def reference_length(of_blocks: float) -> float:
     return of_blocks if math.isfinite(of_blocks) else LENGTH_WITHOUT_BLOCKS
 
 
+GEOMETRY = frozenset({"materials", "blocks", "structures", "bodies", "events", "ground", "walls", "systems"})
+"""Tables of a scenario that decide what is where at the start, and what is open there."""
+
+
 class Placement(NamedTuple):
-    """All bodies of a scenario and their origin."""
+    """All bodies of a scenario, and of each the structure or single body that it comes from."""
 
-    scenario: weakref.ref[Scenario]
     bodies: tuple[PlacedBody, ...]
-    origins: list[overrides.KeyPath]  # of every body the structure or single body that it comes from
+    origins: tuple[overrides.KeyPath, ...]
     sides: dict[Any, Any]  # of structures, what is open there as soon as it is known: open_faces.py
-
-
-_latest: list[Placement] = []  # at most one, for as long as its scenario lives: a million bodies take seconds to place
-
-
-def place_bodies(scenario: Scenario) -> tuple[PlacedBody, ...]:
-    """Place all bodies: structures first, then single bodies, each in the order of the file.
-
-    The same scenario object gives the same bodies again. Raises UnfitError where a structure does
-    not suit its block; loading a scenario has checked that.
-    """
-    return placement_of(scenario).bodies
 
 
 def outlines_of(placed: Sequence[PlacedBody]) -> NDArray[np.float64] | None:
@@ -139,10 +129,11 @@ def outlines_of(placed: Sequence[PlacedBody]) -> NDArray[np.float64] | None:
     return np.array(full, dtype=np.float64)
 
 
-def placement_of(scenario: Scenario) -> Placement:
-    """Return all bodies of a scenario and where each comes from; raises as `place_bodies`."""
-    if _latest and _latest[0].scenario() is scenario:
-        return _latest[0]
+def place(scenario: Scenario) -> Placement:
+    """Place all bodies: structures first, then single bodies, each in the order of the file.
+
+    Raises UnfitError where a structure does not suit its block; loading a scenario has checked that.
+    """
     freed = {name for event in scenario.events for name in event.free}
     bodies: list[PlacedBody] = []
     origins: list[overrides.KeyPath] = []
@@ -159,8 +150,7 @@ def placement_of(scenario: Scenario) -> Placement:
             body = body._replace(driven=is_driven, freed=name in freed, guided=spec.guide != "none")
         bodies.append(body)
         origins.append(("bodies", number))
-    _latest[:] = [Placement(weakref.ref(scenario, lambda _: _latest.clear()), tuple(bodies), origins, {})]
-    return _latest[0]
+    return Placement(tuple(bodies), tuple(origins), {})
 
 
 def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedBody]:

@@ -3,8 +3,9 @@
 import functools
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -112,12 +113,15 @@ def scenario_to_toml(
     return HEADER + tomli_w.dumps(data)
 
 
-def deciding_values(scenario: Scenario) -> dict[str, Any]:
-    """Return everything that determines the motion and the output, as for JSON; of a table of motion its digest."""
-    data = scenario.model_dump(mode="json", exclude=UNHASHED)
-    if isinstance(scenario.motion, motion.TABLED):
+def deciding_values(scenario: Scenario, include: set[str] | None = None) -> dict[str, Any]:
+    """Return everything that determines the motion and the output, as for JSON; of a table of motion its digest.
+
+    All of it, or that of some fields.
+    """
+    data = scenario.model_dump(mode="json", include=include, exclude=UNHASHED)
+    if "motion" in data and isinstance(scenario.motion, motion.TABLED):
         data["motion"]["table"] = scenario.motion.table.digest
-    for number, table in tables_of_bodies(scenario).items():
+    for number, table in tables_of_bodies(scenario).items() if "bodies" in data else ():
         data["bodies"][number]["motion"]["table"] = table.digest
     return data
 
@@ -130,8 +134,20 @@ def tables_of_bodies(scenario: Scenario) -> dict[int, motion.MotionTable]:
 
 def scenario_hash(scenario: Scenario) -> str:
     """Return the SHA-256 (hex) of everything that determines motion and output, whatever the order of the file."""
-    text = json.dumps(deciding_values(scenario), sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hash_of_texts(hashed_texts(scenario, name) for name in type(scenario).model_fields)
+
+
+def hashed_texts(scenario: Scenario, field: str) -> list[str]:
+    """Return what a field of a scenario adds to what is hashed, as JSON: keys and their values."""
+    texts = deciding_values(scenario, {field}).items()
+    return [
+        json.dumps({key: value}, sort_keys=True, separators=(",", ":"), allow_nan=False)[1:-1] for key, value in texts
+    ]
+
+
+def hash_of_texts(texts: Iterable[Sequence[str]]) -> str:
+    """Return the SHA-256 (hex) of what all fields of a scenario add."""
+    return hashlib.sha256(f"{{{','.join(sorted(chain.from_iterable(texts)))}}}".encode()).hexdigest()
 
 
 def _plain(table: object) -> Any:

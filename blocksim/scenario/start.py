@@ -1,9 +1,10 @@
 """Impossible starts although every value is valid by itself: sizes, overlaps, loads, soils."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from itertools import chain, islice, pairwise
 from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +17,16 @@ from blocksim.scenario.models.loads import Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.soil import SoilTable
-from blocksim.scenario.placement import PlacedBody
+from blocksim.scenario.placement import GEOMETRY, PlacedBody, Placement
 from blocksim.scenario.structures import base, polygons
 from blocksim.scenario.units import toml
 
 MAX_LOADS = 1000
 
 
-def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
+def unfit_loads(scenario: Scenario, placed: Placement) -> Iterator[Mistake]:
     """Find loads that do not fit the placed bodies, and bodies that cannot be held; all is valid otherwise."""
-    loads = scenario.loads
+    loads, bodies = scenario.loads, placed.bodies
     if len(loads) > MAX_LOADS:
         yield Mistake(("loads",), f"{len(loads)} loads are too many; at most {MAX_LOADS} are allowed")
         return
@@ -42,7 +43,7 @@ def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mi
             if load.body in by_name:
                 yield from _on_body(scenario, number, load, by_name[load.body], bodies)
         elif isinstance(load, Pressure):
-            yield from _on_structure(scenario, ("loads", number), load)
+            yield from _on_structure(scenario, ("loads", number), load, placed)
     for number, actuator in enumerate(scenario.actuators):
         yield from unknown(("actuators", number, "body"), "body", by_name, actuator.body)
         if actuator.body in by_name:
@@ -53,13 +54,13 @@ def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mi
             yield Mistake(("start", "hold", number), f"body {toml(name)} is fixed and cannot be released")
 
 
-def _on_structure(scenario: Scenario, path: overrides.KeyPath, load: Pressure) -> Iterator[Mistake]:
+def _on_structure(scenario: Scenario, path: overrides.KeyPath, load: Pressure, placed: Placement) -> Iterator[Mistake]:
     """Find a structure that is not there, or has nothing free and open on that side."""
     count = len(scenario.structures)
     if (load.structure or 0) > count:
         have = f"the scenario has {count}" if count else "the scenario has none"
         yield Mistake((*path, "structure"), f"there is no structure {load.structure}; {have}")
-    elif not open_faces.faces_under(scenario, load):
+    elif not open_faces.faces_under(scenario, load, placed):
         yield Mistake((*path, "face"), f"nothing of structure {load.structure} is free and open on that side")
 
 
@@ -115,7 +116,7 @@ MOST_NAMES = 3
 PLACES_ON_A_WALL = 33
 
 
-def particle_places(soil: SoilTable, scenario: Scenario) -> NDArray[np.float64]:
+def particle_places(soil: SoilTable, placed: Sequence[PlacedBody]) -> NDArray[np.float64]:
     """Return where the particles of a soil are at the start (m, (n, 2)).
 
     They fill its outline; what is poured in lies where no block is, or is above.
@@ -123,7 +124,7 @@ def particle_places(soil: SoilTable, scenario: Scenario) -> NDArray[np.float64]:
     places = geometry.fill_lattice(soil.corners, soil.spacing)
     if soil.kind != "fill":
         return places
-    for _, corners in _blocks_in(soil, scenario):
+    for _, corners in _blocks_in(soil, placed):
         near = np.flatnonzero(np.all(places > corners.min(axis=0) - (soil.spacing, math.inf), axis=1))
         near = near[np.all(places[near] < corners.max(axis=0) + soil.spacing, axis=1)]
         is_free = geometry.height_above(corners, places[near]) == 0.0
@@ -132,23 +133,23 @@ def particle_places(soil: SoilTable, scenario: Scenario) -> NDArray[np.float64]:
     return places
 
 
-def _blocks_in(soil: SoilTable, scenario: Scenario) -> Iterator[tuple[str, NDArray[np.float64]]]:
+def _blocks_in(soil: SoilTable, placed: Sequence[PlacedBody]) -> Iterator[tuple[str, NDArray[np.float64]]]:
     """Yield the names and corners (m, (k, 2)) of blocks that are in the outline of a soil."""
     low, high = soil.corners.min(axis=0), soil.corners.max(axis=0)
-    for body in placement.place_bodies(scenario):
+    for body in placed:
         is_near = bool(np.all(low - body.radius < (body.x, body.y)) and np.all((body.x, body.y) < high + body.radius))
         corners = np.array([body.ground_point(*corner) for corner in body.corners])
         if is_near and geometry.overlap(soil.corners, corners):
             yield body.name, corners
 
 
-def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[str, str]]:
+def meetings(soil: SoilTable, key: str, scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[tuple[str, str]]:
     """Yield the key of an outline and what it meets: ground, walls, blocks that it is not poured onto, other soils."""
     found, corners = [*_boundaries(soil, scenario)], soil.corners
     if soil.kind == "fill":
-        if not len(particle_places(soil, scenario)):
+        if not len(particle_places(soil, placed)):
             found.append("blocks everywhere: no particle has room")
-    elif blocks := [name for name, _ in _blocks_in(soil, scenario)]:
+    elif blocks := [name for name, _ in _blocks_in(soil, placed)]:
         more = f" and {len(blocks) - MOST_NAMES} more" if len(blocks) > MOST_NAMES else ""
         which = f"blocks {', '.join(blocks[:MOST_NAMES])}" if len(blocks) > 1 else f"block {blocks[0]}"
         found.append(f'{which}{more}; kind = "fill" leaves blocks out')
@@ -202,38 +203,52 @@ ROUND_OFFS = 100
 distances are differences of a few rounded places."""
 
 
-def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
-    """Place everything and find impossible starts; the scenario is valid otherwise."""
-    unplaceable = [*_too_many(scenario)] or [*_shapeless(scenario)]
-    if unplaceable:
-        yield from unplaceable
-        return
-    yield from _unfit_tables(scenario)
+class Check(NamedTuple):
+    """One reason why a scenario cannot start, and the tables that it depends on beside those that place everything."""
+
+    find: Callable[[Scenario, Callable[[], Placement]], Iterator[Mistake]]  # places everything only if it has to
+    tables: frozenset[str] = frozenset()
+    ends: bool = False  # what follows makes no sense where it finds anything
+
+
+def impossible_starts(
+    scenario: Scenario, placed: Callable[[], Placement], changed: Collection[str] = GEOMETRY
+) -> Iterator[Mistake]:
+    """Find impossible starts of a scenario that is valid otherwise, and was possible before some tables changed.
+
+    `placed` places everything, once, if it is asked to.
+    """
+    for check in CHECKS:
+        mistakes = [*check.find(scenario, placed)] if (check.tables | GEOMETRY).intersection(changed) else []
+        yield from mistakes
+        if mistakes and check.ends:
+            return
+
+
+def _unfit_structures(scenario: Scenario, placed: Callable[[], Placement]) -> Iterator[Mistake]:
+    """Find structures that do not suit their block."""
     try:
-        bodies, origins = placement.place_bodies(scenario), placement.placement_of(scenario).origins
+        placed()
     except base.UnfitError:
         for number, structure in enumerate(scenario.structures):
             try:
                 structure.start(scenario.blocks[structure.block])
             except base.UnfitError as error:
                 yield Mistake(("structures", number, error.key), str(error))
-        return
-    endless = [*_endless(scenario, origins, bodies)]
-    if endless:
-        yield from endless
-        return
-    smallest = placement.smallest_width({(body.size_x, body.size_y, body.outline): body for body in bodies}.values())
-    yield from _unfit_lengths(scenario, smallest, max((max(abs(b.x), abs(b.y)) for b in bodies), default=0.0))
-    for number in repetitions(body.name for body in bodies):
-        message = f"two bodies are named {toml(bodies[number].name)}; a body without a name is called by its number"
-        yield Mistake((*origins[number], "name"), message)
-    yield from _overlaps(scenario, origins, bodies)
-    yield from unfit_loads(scenario, bodies)
+
+
+def _repeated_names(placed: Placement) -> Iterator[Mistake]:
+    for number in repetitions(body.name for body in placed.bodies):
+        name = toml(placed.bodies[number].name)
+        message = f"two bodies are named {name}; a body without a name is called by its number"
+        yield Mistake((*placed.origins[number], "name"), message)
+
+
+def _unfit_systems(scenario: Scenario, placed: Placement) -> Iterator[Mistake]:
     for name, tables in scenario.systems.items():
         for number, table in enumerate(tables):
-            yield from (Mistake((name, number, key), message) for key, message in table.impossible(scenario))
-    yield from events.unfit_probes(scenario, bodies)
-    yield from events.impossible_events(scenario, bodies)
+            found = table.impossible(scenario, placed.bodies)
+            yield from (Mistake((name, number, key), message) for key, message in found)
 
 
 def _too_many(scenario: Scenario) -> Iterator[Mistake]:
@@ -296,10 +311,9 @@ def _why_impossible(body: PlacedBody) -> str:
     return "" if is_possible else f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
 
 
-def _endless(
-    scenario: Scenario, origins: Sequence[overrides.KeyPath], bodies: Sequence[PlacedBody]
-) -> Iterator[Mistake]:
+def _endless(scenario: Scenario, placed: Placement) -> Iterator[Mistake]:
     """Find bodies with places or velocities beyond all numbers, or else cells with such masses; one an origin."""
+    bodies, origins = placed.bodies, placed.origins
     numbers = map(attrgetter("x", "y", "vx", "vy", "spin"), bodies)
     values = np.fromiter(chain.from_iterable(numbers), np.float64, 5 * len(bodies)).reshape(-1, 5)
     lost = {origins[index]: bodies[index] for index in reversed(np.flatnonzero(~np.isfinite(values).all(axis=1)))}
@@ -316,12 +330,15 @@ def _endless(
             yield Mistake(origin, f"body {body.name}: {why}")
 
 
-def _unfit_lengths(scenario: Scenario, smallest: float, farthest: float) -> Iterator[Mistake]:
-    """Find lengths that do not suit the smallest side (m) of the blocks and their farthest coordinate (m).
+def _unfit_lengths(scenario: Scenario, placed: Placement) -> Iterator[Mistake]:
+    """Find lengths that do not suit the smallest side of the blocks and their farthest coordinate.
 
     Particles too far apart or too many, kernels that reach through a block, a skin, and segments of boundary so short
     that a corner could miss them.
     """
+    kinds = {(body.size_x, body.size_y, body.outline): body for body in placed.bodies}
+    smallest = placement.smallest_width(kinds.values())
+    farthest = max((max(abs(body.x), abs(body.y)) for body in placed.bodies), default=0.0)
     contact, spacing, skin = scenario.contact, scenario.contact.particle_spacing, scenario.contact.skin
     side = f"the smallest side of a block, {_mm(smallest)}"
     if contact.model != "surface":
@@ -359,10 +376,9 @@ def _unfit_lengths(scenario: Scenario, smallest: float, farthest: float) -> Iter
             yield Mistake(path, message, relation=True)
 
 
-def _overlaps(
-    scenario: Scenario, origins: Sequence[overrides.KeyPath], bodies: Sequence[PlacedBody]
-) -> Iterator[Mistake]:
+def _overlaps(scenario: Scenario, placed: Placement) -> Iterator[Mistake]:
     """Find bodies in the ground, each with its largest depth, bodies in walls, and bodies in one another."""
+    bodies, origins = placed.bodies, placed.origins
     if scenario.ground.profile is None:
         bottom = overlap.Outlines.of(bodies).bottom
         for index in np.flatnonzero(bottom < -placement.TOLERANCE)[:MAX_MISTAKES]:
@@ -391,3 +407,27 @@ def _overlaps(
 
 def _mm(length: float) -> str:
     return f"{length * 1e3:.6g} mm"
+
+
+def _of_placed(find: Callable[[Scenario, Placement], Iterator[Mistake]], *tables: str) -> Check:
+    return Check(lambda scenario, placed: find(scenario, placed()), frozenset(tables))
+
+
+CHECKS = (
+    Check(lambda scenario, _: _too_many(scenario), frozenset({"probes"}), ends=True),
+    Check(lambda scenario, _: _shapeless(scenario), ends=True),
+    Check(lambda scenario, _: _unfit_tables(scenario), frozenset({"motion", "time", "contact", "pairs"})),
+    Check(_unfit_structures, ends=True),
+    _of_placed(_endless)._replace(ends=True),
+    _of_placed(_unfit_lengths, "contact"),
+    _of_placed(lambda _, placed: _repeated_names(placed)),
+    _of_placed(_overlaps),
+    _of_placed(unfit_loads, "loads", "actuators", "start"),
+    _of_placed(_unfit_systems),
+    _of_placed(lambda scenario, placed: events.unfit_probes(scenario, placed.bodies), "probes", "actuators"),
+    _of_placed(
+        lambda scenario, placed: events.impossible_events(scenario, placed.bodies),
+        *("events", "loads", "actuators", "time"),
+    ),
+)
+"""In the order in which mistakes are reported."""

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.kernels.common.arrays import zeros
 from blocksim.options import Option
-from blocksim.scenario import Scenario, load_stored, resolution, units
+from blocksim.scenario import Model, Scenario, load_stored, resolution, units
 from blocksim.simulation import files, instruments, provenance, results
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stores.hdf5 import read_probes, read_rows
@@ -321,7 +321,7 @@ def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
     return Resumption(newest, tuple(remarks), (note,))
 
 
-def take_over(stored: StoredCheckpoint, scenario: Scenario, recorder: instruments.Recorder) -> None:
+def take_over(stored: StoredCheckpoint, model: Model, recorder: instruments.Recorder) -> None:
     """Let a recorder begin with the frames at output times, and samples of probes, that earlier parts have left.
 
     Raises what reading them raises, and InvalidInputError where some before the checkpoint are missing, or are not as
@@ -339,7 +339,7 @@ def take_over(stored: StoredCheckpoint, scenario: Scenario, recorder: instrument
             f"{path}: changed after the interruption: the {count} frames before step {position.step} do not "
             f"match the SHA-256 in {stored.path.name}; {REMEDY}"
         )
-    kept = read_probes(path, scenario) if recorder.probes.all else {}
+    kept = read_probes(path, model) if recorder.probes.all else {}
     for probe in recorder.probes.all:
         if probe.name not in kept or not probe.take_over(kept[probe.name], position.step):
             raise InvalidInputError(f"{path}: samples of probe {probe.name} are missing {before}")

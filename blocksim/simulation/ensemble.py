@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common import arrays, compiler, systems
 from blocksim.kernels.common.members import Watched, next_frame
-from blocksim.scenario import PlacedBody, Scenario, motion as motions, placement
+from blocksim.scenario import Model, PlacedBody, Scenario, motion as motions, placement
 from blocksim.simulation import balance, instruments, loop, observables, rest_state, schemes, trajectory
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, OUTCOME, Value, Watch, observe
 from blocksim.world import build
@@ -124,7 +124,7 @@ def member_ends(
             time_step=time_steps[m],
             rows=instruments.FrameRows(steps[m], (motion[some],), measured[some], names),
             observables=observed,
-            convergence=schemes.scheme_of(scenes).convergence(build.member(scenes, m)),
+            convergence=schemes.scheme_of(scenes).convergence(scenes, m),
         )
     return ends
 
@@ -136,8 +136,10 @@ CHUNK = 4  # members at most that a thread takes at a time: few enough that all 
 Steps = NDArray[np.int64]
 
 
-def run_ensemble(scenarios: Sequence[Scenario], *, threads: int | None = None, peaks: bool = False) -> list[MemberEnd]:
-    """Run scenarios to their ends and return those in the same order.
+def run_ensemble(
+    sources: Sequence[Scenario | Model], *, threads: int | None = None, peaks: bool = False
+) -> list[MemberEnd]:
+    """Run scenarios, or models, to their ends and return those in the same order.
 
     They may differ in anything; those whose scenes have the same shape (scheme, numbers of bodies and material pairs)
     are advanced together, on `threads` threads (default: one a core). The result does not depend on that number. With
@@ -145,7 +147,7 @@ def run_ensemble(scenarios: Sequence[Scenario], *, threads: int | None = None, p
     world raises, and ValueError for less than one thread.
     """
     ends: list[MemberEnd] = []
-    for batch in run_in_batches(scenarios, threads=threads, peaks=peaks):
+    for batch in run_in_batches(sources, threads=threads, peaks=peaks):
         for end in batch:
             if isinstance(end, MemberFailure):
                 raise end.error
@@ -154,7 +156,7 @@ def run_ensemble(scenarios: Sequence[Scenario], *, threads: int | None = None, p
 
 
 def run_in_batches(
-    scenarios: Iterable[Scenario], *, threads: int | None = None, most: int = BATCH, peaks: bool = False
+    sources: Iterable[Scenario | Model], *, threads: int | None = None, most: int = BATCH, peaks: bool = False
 ) -> Iterator[list[EnsembleEnd]]:
     """Run scenarios as `run_ensemble` does, at most `most` at a time; yield where those of a batch ended, in order.
 
@@ -166,44 +168,45 @@ def run_in_batches(
     for what, number in (("threads", count), ("members", most)):
         if number < 1:
             raise ValueError(f"{what} must be at least 1, not {number}")
-    return _run_all(scenarios, count, most, peaks=peaks)
+    return _run_all(map(Model, sources), count, most, peaks=peaks)
 
 
-def _run_all(scenarios: Iterable[Scenario], threads: int, most: int, *, peaks: bool) -> Iterator[list[EnsembleEnd]]:
+def _run_all(models: Iterable[Model], threads: int, most: int, *, peaks: bool) -> Iterator[list[EnsembleEnd]]:
     """Yield the ends of one batch after the other, each in the order of its scenarios."""
     with ThreadPoolExecutor(threads) as pool:
-        for batch in _batches(scenarios, most):
-            for kernels in dict.fromkeys(map(schemes.kernels_of, batch)):
+        for batch in _batches(models, most):
+            for kernels in dict.fromkeys(schemes.kernels_of(model.scenario) for model in batch):
                 schemes.compile_kernels(kernels)
             ends: dict[int, EnsembleEnd] = {}
             for one in schemes.build_stacks(batch):
                 if isinstance(one, build.Refusal):
                     ends[one.number] = MemberFailure(one.error)
                     continue
-                first, stack = batch[one.numbers[0]], one
+                first, scenes = batch[one.numbers[0]], one.scenes
                 try:
-                    if motions.settles(first):  # it has one scene
-                        scene = build.member(one.scenes, 0)
-                        scene, _ = rest_state.initial_scene(scene, first, one.placed[0], schemes.ALONE)
-                        stack = one._replace(scenes=build.stack_of_one(scene))
+                    if motions.settles(first.scenario):  # it has one scene
+                        scene = build.member(scenes, 0)
+                        scene, _ = rest_state.initial_scene(scene, first, schemes.ALONE)
+                        scenes = build.stack_of_one(scene)
                 except BlocksimError as error:
                     ends[one.numbers[0]] = MemberFailure(error)
                     continue
-                ensemble = Ensemble(batch, stack, peaks=peaks)
+                own = [batch[number] for number in one.numbers]
+                ensemble = Ensemble(own, scenes, peaks=peaks)
                 ensemble.advance(pool, threads)
                 ends.update(zip(one.numbers, ensemble.ends(), strict=True))
             yield [ends[i] for i in range(len(batch))]
 
 
-def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario]]:
-    batch: list[Scenario] = []
+def _batches(models: Iterable[Model], most: int) -> Iterator[list[Model]]:
+    batch: list[Model] = []
     bodies = 0
-    for scenario in scenarios:
-        count = sum(structure.size for structure in scenario.structures) + len(scenario.bodies)
+    for model in models:
+        count = len(model.bodies)
         if batch and (len(batch) == most or bodies + count > MOST_BODIES):
             yield batch
             batch, bodies = [], 0
-        batch.append(scenario)
+        batch.append(model)
         bodies += count
     if batch:
         yield batch
@@ -212,26 +215,26 @@ def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario
 class Ensemble:
     """Scenes of one scheme and shape, stacked, to be advanced together once."""
 
-    def __init__(self, scenarios: Sequence[Scenario], stack: build.SceneStack, *, peaks: bool = False) -> None:
-        """Take a stack of scenes that have not moved yet, and the scenarios that its numbers count.
+    def __init__(self, models: Sequence[Model], scenes: schemes.AnyScene, *, peaks: bool = False) -> None:
+        """Take a stack of scenes that have not moved yet, and what they are scenes of.
 
         `peaks` says whether the largest rotations on the way are followed.
         """
-        self.placed = stack.placed
+        self.placed = [model.bodies for model in models]
         self.has_peaks = peaks
-        self.scenes: schemes.AnyScene = stack.scenes
+        self.scenes = scenes
         self.scheme, self.names = schemes.scheme_of(self.scenes), schemes.ledger_names(self.scenes)
         self.bodies = int(self.scenes.world.bodies.shape[1]) - 1
         self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
-        own = [scenarios[number] for number in stack.numbers]
-        whole = [*zip(own, self.placed, self.time_steps, strict=True)]
-        self.timelines = [loop.Timeline(*one) if one[0].events else None for one in whole]
-        self.last_steps = np.array([loop.last_step_of(one.time.end, step) for one, _, step in whole], dtype=np.int64)
+        own = [*zip(models, self.time_steps, strict=True)]
+        self.timelines = [loop.Timeline(*one) if one[0].scenario.events else None for one in own]
+        ends = [loop.last_step_of(model.scenario.time.end, step) for model, step in own]
+        self.last_steps = np.array(ends, dtype=np.int64)
         self.starts = np.zeros((len(own), len(self.scheme.row_names)))
         self.codes = np.zeros(len(own), dtype=np.int64)
-        self.periods = np.array([max(one.output.every / step, 1.0) for one, _, step in whole])
+        self.periods = np.array([max(model.scenario.output.every / step, 1.0) for model, step in own])
         start = self._positions(self.scenes, slice(None))
-        self.supports = [observables.MovingSupport(one) for one in own]
+        self.supports = [observables.MovingSupport(model) for model in models]
         self.watch = Watch(self.placed, self.supports, start)
         steps, places = np.zeros(len(own), dtype=np.int64), np.zeros_like(start)
         shapes = self.watch.shapes

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
-from blocksim.scenario import Scenario, input_files, resolution, scenario_to_toml
+from blocksim.scenario import Model, Scenario, input_files, resolution, scenario_to_toml
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, TABLED
 from blocksim.simulation.provenance import run_hash
 
@@ -328,16 +328,16 @@ UNFINISHED = (
 )
 
 
-def default_folder(scenario: Scenario) -> Path:
+def default_folder(model: Model) -> Path:
     """Return results/<name>/<hash of the resolved scenario and the code>."""
-    return RESULTS / scenario.name / run_hash(scenario)
+    return RESULTS / model.scenario.name / run_hash(model)
 
 
-def holds_run(folder: Path, scenario: Scenario) -> bool:
+def holds_run(folder: Path, model: Model) -> bool:
     """Return True if the folder holds a finished run of exactly this scenario and code."""
     with contextlib.suppress(BlocksimError, ValueError, KeyError, TypeError, RecursionError):
         done = json.loads(input_files.read_limited(folder / DONE, DONE_BYTES))
-        return bool(done["run"] == run_hash(scenario))
+        return bool(done["run"] == run_hash(model))
     return False
 
 

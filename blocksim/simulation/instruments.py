@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import PlacedBody, Scenario, events, place_segments
+from blocksim.scenario import Model, PlacedBody, events
 from blocksim.scenario.models.timeline import STEP, ActuatorProbe, ForceProbe, JointProbe, PointProbe
 from blocksim.simulation import balance, observables, trajectory
 from blocksim.world.systems import systems_of
@@ -107,11 +107,11 @@ class ProbeSeries:
             yield "".join(",".join(map(repr, row)) + "\n" for row in rows)
 
 
-def bytes_of_series(scenario: Scenario, steps: int, step: float, energies: int) -> int:
+def bytes_of_series(model: Model, steps: int, step: float, energies: int) -> int:
     """Return the bytes that the probes of a run of so many steps (s) take in its folder, with so many energies."""
     total = 0.0
-    for probe in events.probes_of(scenario).values():
-        every = step if probe.every == STEP else float(probe.every or scenario.output.every)
+    for probe in model.probes.values():
+        every = step if probe.every == STEP else float(probe.every or model.scenario.output.every)
         columns = energies if probe.kind == ENERGY else len(COLUMNS[probe.kind])
         rows = steps * step / max(every, step) + 1
         total += (2 + columns) * (8 * CHUNK_ROWS * math.ceil(rows / CHUNK_ROWS) + DIGITS * rows)
@@ -332,10 +332,10 @@ class Probes:
 NO_PROBES = Probes((), observables.AT_REST, 1.0)
 
 
-def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float, ledger: Sequence[str]) -> Probes:
+def probes_of(model: Model, time_step: float, ledger: Sequence[str]) -> Probes:
     """Return the probes of a scenario with steps of this length (s); `ledger` names its energies (J)."""
-    parts = [(one, () if one.parts is None else one.parts(scenario)) for one in systems_of(scenario)]
-    named = _numbers(scenario, placed, [part for _, parts_of in parts for part in parts_of])
+    parts = [(one, () if one.parts is None else one.parts(model)) for one in systems_of(model)]
+    placed, named = model.bodies, _numbers(model, [part for _, parts_of in parts for part in parts_of])
     count = 1 + max(number for numbers in named.values() for number in numbers)
 
     def flags(name: str) -> NDArray[np.bool_]:
@@ -344,7 +344,7 @@ def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float
         return flags
 
     made = []
-    for name, probe in events.probes_of(scenario).items():
+    for name, probe in model.probes.items():
         sampler: Sampler = attrgetter("energies")
         match probe:
             case ForceProbe():
@@ -359,26 +359,26 @@ def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float
                 assert joint is not None  # noqa: S101 - the scenario was checked
                 sampler = joint_sampler((first, second), (placed[first], placed[second]), joint)
             case ActuatorProbe():
-                names = events.actuator_names(scenario)
+                names = events.actuator_names(model.scenario)
                 sampler = actuator_sampler(names.index(probe.actuator) - len(names))
-        every = scenario.output.every if probe.every is None else probe.every
+        every = model.scenario.output.every if probe.every is None else probe.every
         period = 1.0 if every == STEP else max(float(every) / time_step, 1.0)
         columns = dict.fromkeys(ledger, "J") if probe.kind == ENERGY else COLUMNS[probe.kind]
         made.append(ProbeChannel(name, probe.kind, columns, period, sampler))
     systems = [(one, len(parts_of)) for one, parts_of in parts]
-    return Probes(made, observables.MovingSupport(scenario if made else None), time_step, systems)
+    return Probes(made, observables.MovingSupport(model if made else None), time_step, systems)
 
 
-def _numbers(scenario: Scenario, placed: Sequence[PlacedBody], parts: Sequence[str]) -> dict[str, Sequence[int]]:
+def _numbers(model: Model, parts: Sequence[str]) -> dict[str, Sequence[int]]:
     """Return which bodies names mean: blocks, pieces of ground, walls, the half-plane, then parts of systems."""
-    blocks = len(placed)
-    count = blocks + len(place_segments(scenario)) + 1
-    walls = range(count - 1 - len(scenario.walls), count - 1)
+    placed, blocks = model.bodies, len(model.bodies)
+    count = blocks + len(model.segments) + 1
+    walls = range(count - 1 - len(model.scenario.walls), count - 1)
     return {
         events.SUPPORTS: [*(number for number, body in enumerate(placed) if body.fixed), *range(blocks, count)],
         events.GROUND: [number for number in range(blocks, count) if number not in walls],
         events.WALLS: walls,
-        **{name: [wall] for name, wall in zip(events.wall_names(scenario), walls, strict=True)},
+        **{name: [wall] for name, wall in zip(events.wall_names(model.scenario), walls, strict=True)},
         **{part: [number] for number, part in enumerate(parts, start=count)},
         **{body.name: [number] for number, body in enumerate(placed)},
     }

@@ -17,7 +17,7 @@ import numpy as np
 from blocksim.errors import ExitCode
 from blocksim.kernels.common import arrays, tolerances
 from blocksim.kernels.common.loads import value_at
-from blocksim.scenario import PlacedBody, Scenario, events, open_faces
+from blocksim.scenario import Model, PlacedBody, events
 from blocksim.scenario.models.timeline import Event
 from blocksim.simulation import balance, checkpoint, instruments, observables, results, schemes
 
@@ -34,12 +34,13 @@ OF_FREE_BODIES = (*NOT_THERE, *RATES, *ACCELERATIONS, *OF_CONTACTS, *OF_PIECES) 
 class Timeline:
     """The events of one run, and how far they have come."""
 
-    def __init__(self, scenario: Scenario, placed: Sequence[PlacedBody], step: float) -> None:
-        """Take the bodies as placed and the time step (s)."""
-        self.events, self.placed, self.step = scenario.events, placed, step
-        self.names = {body.name: number for number, body in enumerate(placed)}
+    def __init__(self, model: Model, step: float) -> None:
+        """Take the time step (s)."""
+        scenario = model.scenario
+        self.events, self.placed, self.step = scenario.events, model.bodies, step
+        self.names = {body.name: number for number, body in enumerate(model.bodies)}
         self.walls = events.wall_names(scenario)
-        self.loads = [one.load.name for one in open_faces.acting_loads(scenario, self.names)]
+        self.loads = [one.load.name for one in model.acting_loads]
         self.loads += events.actuator_names(scenario)
         self.records: tuple[results.EventRecord, ...] = ()
         order = events.in_order(self.events)

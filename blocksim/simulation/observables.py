@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from blocksim.scenario import PlacedBody, Scenario, motion
+from blocksim.scenario import Model, PlacedBody, motion
 from blocksim.simulation.trajectory import MILLI
 
 ROUND_OFF = 1e-9  # between two ways to compute a distance
@@ -51,14 +51,14 @@ Value = str | float | bool | None
 class MovingSupport:
     """Motion of the support."""
 
-    def __init__(self, scenario: Scenario | None) -> None:
-        """Work out the pieces of its motion once; without a scenario, or without a motion, it rests."""
+    def __init__(self, model: Model | None) -> None:
+        """Work out the pieces of its motion once; without a model, or without a motion, it rests."""
         self.times: list[float] = []
         self.coefficients: list[list[float]] = []
         self.direction = (1.0, 0.0)
-        if scenario is not None and scenario.motion is not None:
-            pieces = motion.motion_pieces(scenario)
-            self.direction = motion.motion_direction(scenario)
+        if model is not None and model.scenario.motion is not None:
+            pieces = model.motion
+            self.direction = motion.motion_direction(model.scenario)
             self.times, self.coefficients = pieces.times.tolist(), pieces.coefficients.tolist()
 
     @property

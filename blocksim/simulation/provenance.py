@@ -10,7 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.scenario import Scenario, scenario_hash
+from blocksim.scenario import Model
 from blocksim.simulation.balance import solver_module
 
 if TYPE_CHECKING:
@@ -42,9 +42,9 @@ def code_hash() -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def run_hash(scenario: Scenario) -> str:
+def run_hash(model: Model) -> str:
     """Return the name of a run: a hash of everything that decides its bits, scenario and code."""
-    text = f"{scenario_hash(scenario)} {code_hash()}"
+    text = f"{model.hash} {code_hash()}"
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode, StoppedEarlyError
 from blocksim.kernels.common.arrays import LOAD_ACTUATOR, REACHED
-from blocksim.scenario import PlacedBody, Scenario, motion, overlap, placement
+from blocksim.scenario import Model, motion, overlap, placement
 from blocksim.simulation import results, schemes
 from blocksim.world.build import arrays_of
 
@@ -70,33 +70,33 @@ class SettleError(BlocksimError):
 
 
 def initial_scene(
-    scene: schemes.AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: schemes.Team, stop: Stop = str
+    scene: schemes.AnyScene, model: Model, team: schemes.Team, stop: Stop = str
 ) -> tuple[schemes.AnyScene, results.RestState | None]:
     """Return a scene at time zero as its run begins, and how it settled, where it did.
 
     Raises SettleError where that was asked for and fails; otherwise the scene begins as it was placed. Raises
     StoppedEarlyError where `stop` says why.
     """
+    scenario, placed = model.scenario, model.bodies
     if scenario.start.settle:
-        return settle(scene, scenario, placed, team, stop)
+        return settle(scene, model, team, stop)
     if not motion.settles(scenario) or any(body.vx or body.vy or body.spin for body in placed):
         return scene, None
     kept = [array.copy() for array in arrays_of(scene)]
     with suppress(SettleError):
-        found, settled = settle(scene, scenario, placed, team, stop)
+        found, settled = settle(scene, model, team, stop)
         if settled.largest_displacement_mm <= MILLI * UNASKED_SHARE * placement.smallest_width(placed):
             return found, settled
     _restore(scene, kept)
     return scene, None
 
 
-def rests(scenario: Scenario) -> bool | None:
+def rests(model: Model) -> bool | None:
     """Return whether a scenario has an equilibrium on its contacts, found without time; None where that is not known.
 
     Raises as `build`.
     """
-    built = schemes.build(scenario)
-    run = _Settlement(built.scene, scenario, built.placed, schemes.ALONE, str)
+    run = _Settlement(schemes.build(model), model, schemes.ALONE, str)
     with run.without_time():
         try:
             return True if run.balance() else None
@@ -105,13 +105,13 @@ def rests(scenario: Scenario) -> bool | None:
 
 
 def settle(
-    scene: schemes.AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: schemes.Team, stop: Stop = str
+    scene: schemes.AnyScene, model: Model, team: schemes.Team, stop: Stop = str
 ) -> tuple[schemes.AnyScene, results.RestState]:
     """Bring a scene at time zero to rest; return it, still at time zero, and how.
 
     Raises SettleError, and StoppedEarlyError where `stop` says why.
     """
-    run = _Settlement(scene, scenario, placed, team, stop)
+    run = _Settlement(scene, model, team, stop)
     with run.without_time():
         try:
             if not run.balance():
@@ -131,8 +131,8 @@ def settle(
     return run.scene, results.RestState(
         steps=run.steps,
         largest_displacement_mm=MILLI * float(ways[far]),
-        displaced_block=placed[far].name,
-        held=scenario.start.hold,
+        displaced_block=model.bodies[far].name,
+        held=model.scenario.start.hold,
         at_rest=not run.leaving,
     )
 
@@ -140,9 +140,8 @@ def settle(
 class _Settlement:
     """A scene on its way to rest."""
 
-    def __init__(
-        self, scene: schemes.AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: schemes.Team, stop: Stop
-    ) -> None:
+    def __init__(self, scene: schemes.AnyScene, model: Model, team: schemes.Team, stop: Stop) -> None:
+        scenario, placed = model.scenario, model.bodies
         self.scene, self.placed, self.team, self.stop = scene, placed, team, stop
         self.scheme = schemes.scheme_of(scene)
         self.pace = self.scheme.settling

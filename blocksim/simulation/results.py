@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
 from blocksim.notebook import Shown
-from blocksim.scenario import Scenario, input_files, load_stored, place_bodies
+from blocksim.scenario import Model, Scenario, input_files
 from blocksim.simulation import balance, files, instruments, observables, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
 from blocksim.world.systems import systems_of
@@ -139,14 +139,19 @@ class Result(Shown):
     )  # samples in memory, where they are
 
     @cached_property
+    def model(self) -> Model:
+        """What follows from the scenario."""
+        return Model(self.scenario)
+
+    @cached_property
     def frames(self) -> trajectory.Frames:
         """The frames, read from the folder when first asked for. Raises what reading them raises."""
-        return read_frames(self._run_file, self.scenario) if self.held is None else self.held
+        return read_frames(self._run_file, self.model) if self.held is None else self.held
 
     @cached_property
     def probes(self) -> dict[str, instruments.ProbeSeries]:
         """The samples of probes by name, read from the folder when first asked for. Raises what reading them raises."""
-        return read_probes(self._run_file, self.scenario) if self.held_probes is None else self.held_probes
+        return read_probes(self._run_file, self.model) if self.held_probes is None else self.held_probes
 
     @property
     def _run_file(self) -> Path:
@@ -156,10 +161,10 @@ class Result(Shown):
     @cached_property
     def endings(self) -> dict[str, trajectory.Columns]:
         """Where the systems beside the blocks ended, by their names: tables as in NAME.csv of a run folder."""
-        if all(system.ending is None for system in systems_of(self.scenario)):
+        if all(system.ending is None for system in systems_of(self.model)):
             return {}  # frames are many, and nothing of them is asked for
         return {
-            track.system.name: track.system.ending(self.scenario, track)
+            track.system.name: track.system.ending(self.model, track)
             for track in self.frames.others
             if track.system.ending is not None
         }
@@ -209,16 +214,16 @@ class Result(Shown):
 def read_result(folder: Path) -> Result:
     """Return the run that a folder holds. Raises InputMissingError or InvalidInputError."""
     summary = read_summary(folder / files.SUMMARY)
-    scenario = load_stored(folder / files.SCENARIO)
-    frames = read_frames(folder / files.FRAMES, scenario)
-    return Result(scenario.name, read_final(folder, scenario), summary, scenario, folder, frames)
+    model = Model.stored(folder / files.SCENARIO)
+    frames = read_frames(folder / files.FRAMES, model)
+    return Result(model.scenario.name, read_final(folder, model), summary, model.scenario, folder, frames)
 
 
-def read_final(folder: Path, scenario: Scenario) -> trajectory.Columns:
+def read_final(folder: Path, model: Model) -> trajectory.Columns:
     """Return the final table in the folder of a run of a scenario. Raises InputMissingError or InvalidInputError."""
     path = folder / files.FINAL
     columns = trajectory.read_table(path)
-    if columns["block"] != [body.name for body in place_bodies(scenario)]:
+    if columns["block"] != [body.name for body in model.bodies]:
         raise InvalidInputError(f"{path}: its blocks are not those of {files.SCENARIO}")
     return columns
 
@@ -234,7 +239,7 @@ def keep_result(result: Result, summary: Summary, folder: Path) -> Result:
     files.write_text(folder / files.FINAL, trajectory.csv_text(result.columns))
     for name, table in result.endings.items():
         files.write_text(folder / f"{name}.csv", trajectory.csv_text(table))
-    probes = read_probes(folder / files.FRAMES, result.scenario)
+    probes = read_probes(folder / files.FRAMES, result.model)
     tables = {f"{files.PROBE}{name}.csv": series for name, series in probes.items()}
     for name, series in tables.items():
         files.write_text(folder / name, "".join(series.csv_lines()))

@@ -3,11 +3,12 @@
 import math
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from blocksim.errors import OutputError
 from blocksim.kernels.common import arrays, compiler
 from blocksim.kernels.common.tolerances import MOST_ROUNDS
 from blocksim.options import silent
-from blocksim.scenario import PlacedBody, Scenario, check, events, motion, placement, scenario_hash
+from blocksim.scenario import Model, Scenario, events, motion, placement
 from blocksim.scenario.models.motion import Pulse
 from blocksim.scenario.models.timeline import Nonsmooth
 from blocksim.simulation import balance, checkpoint, files, instruments, loop, observables, provenance, results, schemes
@@ -28,9 +29,9 @@ from blocksim.world import build, free_memory, memory, systems
 CHECKPOINT_FILES = len(files.CHECKPOINTS) + 1  # the last one while it is written
 
 
-def refuse_full_disk(folder: Path, scenario: Scenario, scene: schemes.AnyScene) -> None:
+def refuse_full_disk(folder: Path, model: Model, scene: schemes.AnyScene) -> None:
     """Raise OutputError where a run may leave more than there is room for on the disk of a folder (yet to be made)."""
-    needed = bytes_needed(scenario, scene)
+    needed = bytes_needed(model, scene)
     place = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     free = shutil.disk_usage(place).free
     if needed > free:
@@ -41,16 +42,16 @@ def refuse_full_disk(folder: Path, scenario: Scenario, scene: schemes.AnyScene) 
         )
 
 
-def bytes_needed(scenario: Scenario, scene: schemes.AnyScene) -> int:
+def bytes_needed(model: Model, scene: schemes.AnyScene) -> int:
     """Return the bytes that the frames of a run and its checkpoints take at most."""
-    step, every = float(scene.world.controls[0].step), scenario.output.every
+    scenario, step = model.scenario, float(scene.world.controls[0].step)
     steps = loop.last_step_of(scenario.time.end, step)
-    frames = round(min(steps, scenario.time.end / every)) + 2  # the first, and wherever it ends
+    frames = round(min(steps, scenario.time.end / scenario.output.every)) + 2  # the first, and wherever it ends
     bodies, particles = scene.world.bodies.size - 1, 0 if scene.world.particles is None else scene.world.particles.size
     contacts = max(memory.CONTACTS_OF_A_BODY * bodies, particles) if scenario.output.contacts else 0
     state = sum(array.nbytes for array in build.arrays_of(scene))
-    series = instruments.bytes_of_series(scenario, steps, step, len(schemes.ledger_names(scene)))
-    return series + memory.run_bytes(bodies, frames, contacts, systems.others_of(scenario)) + CHECKPOINT_FILES * state
+    series = instruments.bytes_of_series(model, steps, step, len(schemes.ledger_names(scene)))
+    return series + memory.run_bytes(bodies, frames, contacts, systems.others_of(model)) + CHECKPOINT_FILES * state
 
 
 GAINED = 0.5  # a/w
@@ -60,23 +61,21 @@ MILLI = 1e3
 SAMPLES = 20_000  # of twice the duration of a pulse
 
 
-def _onset_warnings(
-    scenario: Scenario, placed: Sequence[PlacedBody], world: arrays.World, settled: results.RestState | None
-) -> Iterator[str]:
+def _onset_warnings(model: Model, world: arrays.World, settled: results.RestState | None) -> Iterator[str]:
     """Yield a warning where springs make a slip under an abrupt pulse too large by more than the promise."""
-    pulse = scenario.motion
+    scenario, pulse = model.scenario, model.scenario.motion
     if not isinstance(pulse, Pulse) or not pulse.is_abrupt or not scenario.time.has_springs:
         return
     if (settled is not None and pulse.start == 0.0) or scenario.ground.tilt != 0.0:
         return
     ground, errors = int(world.bodies[-1]["contact_class"]), [(0.0, "")]
-    for body, one in zip(world.bodies[:-1], placed, strict=True):  # those that slip on the ground
+    for body, one in zip(world.bodies[:-1], model.bodies, strict=True):  # those that slip on the ground
         values = world.interactions[int(body["contact_class"]), ground]
         stiffness = 2.0 * float(values["normal_stiffness"] * values["shear_ratio"])
         limit = float(values["kinetic_friction"]) * scenario.gravity
         if stiffness > 0.0 and limit < pulse.amplitude and not one.fixed:
             gained = GAINED * pulse.amplitude * math.sqrt(one.mass / stiffness)
-            errors.append((gained / mean_slip_rate(scenario, pulse, limit), one.name))
+            errors.append((gained / mean_slip_rate(model, limit), one.name))
     worst, name = max(errors)
     if worst > PROMISE:
         yield (
@@ -86,10 +85,11 @@ def _onset_warnings(
         )
 
 
-def mean_slip_rate(scenario: Scenario, pulse: Pulse, limit: float) -> float:
-    """Return the mean velocity (m/s) of the first slip of a rigid block whose friction gives it `limit` (m/s2)."""
+def mean_slip_rate(model: Model, limit: float) -> float:
+    """Return the mean velocity (m/s) of the first slip under a pulse of a block that friction gives `limit` (m/s2)."""
+    pulse = cast("Pulse", model.scenario.motion)
     times = pulse.start + np.linspace(0.0, 2.0 * pulse.resolved_duration, SAMPLES + 1)
-    _, velocity = motion.displacement_and_velocity(motion.motion_pieces(scenario), times)
+    _, velocity = motion.displacement_and_velocity(model.motion, times)
     most = limit * float(times[1] - times[0])
     block = float(velocity[0])
     slip: list[float] = []
@@ -117,25 +117,25 @@ NO_CALLBACKS = RunCallbacks()
 
 
 def simulate(
-    scenario: Scenario, *, threads: int = 1, on_progress: loop.Watcher = silent, wall_time: float | None = None
+    source: Scenario | Model, *, threads: int = 1, on_progress: loop.Watcher = silent, wall_time: float | None = None
 ) -> results.Result:
     """Run a scenario in memory, without writing anything. A signal or the limit of wall time (s) interrupts it.
 
     The result does not depend on the number of threads; small scenes do not use them all.
     """
-    limit, began = WallTime(wall_time), time.perf_counter()
+    model, limit, began = Model(source), WallTime(wall_time), time.perf_counter()
     limit.check()
-    built = schemes.build(scenario)
+    scene = schemes.build(model)
     limit.check()
-    began += _compiled(scenario)
-    with _attended(scenario, built, threads, limit, on_progress) as (recorder, team, control):
-        scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
-        ended = loop.run_loop(scene, recorder, scenario.time.end, team=team, control=control)
-    return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
+    began += _compiled(model)
+    with _attended(model, scene, threads, limit, on_progress) as (recorder, team, control):
+        scene, settled = initial_scene(scene, model, team, control.stop)
+        ended = loop.run_loop(scene, recorder, model.scenario.time.end, team=team, control=control)
+    return _result(model, recorder, ended, time.perf_counter() - began, settled)
 
 
 def simulate_into(
-    scenario: Scenario,
+    source: Scenario | Model,
     folder: Path,
     *,
     overwrite: bool = False,
@@ -155,32 +155,34 @@ def simulate_into(
     `interrupted`, and what was computed until then is kept.
     """
     limit, began = WallTime(precautions.wall_time, precautions.time_over), time.perf_counter()
+    model = Model(source)
+    scenario = model.scenario
     limit.check()
-    built = schemes.build(scenario)
+    scene = schemes.build(model)
     limit.check()
-    refuse_full_disk(folder, scenario, built.scene)
+    refuse_full_disk(folder, model, scene)
     tables = files.read_tables(scenario)
     with files.folder_lock(folder):
         resumption = checkpoint.find_resumption(folder, scenario) if resume else checkpoint.Resumption()
         for remark in (*resumption.remarks, *resumption.notes):
             listener.on_remark(remark)
-        began += _compiled(scenario, listener)
+        began += _compiled(model, listener)
         stored = resumption.checkpoint
-        with _attended(scenario, built, threads, limit, on_progress) as (recorder, team, control):
+        with _attended(model, scene, threads, limit, on_progress) as (recorder, team, control):
             if stored is None:
-                scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
+                scene, settled = initial_scene(scene, model, team, control.stop)
                 past = checkpoint.Past(settled=settled)
                 files.prepare_folder(folder, overwrite=overwrite or resume)
             else:
-                scene, position = checkpoint.restore_scene(stored, built.scene), stored.head.position
+                scene, position = checkpoint.restore_scene(stored, scene), stored.head.position
                 settled, parts = position.settled, (*position.resumed_from, position.step)
                 past = checkpoint.Past(position.total_seconds, parts, stored.path, position.step, settled)
-                checkpoint.take_over(stored, scenario, recorder)
+                checkpoint.take_over(stored, model, recorder)
             toml = files.keep_scenario(scenario, tables, folder)
             with FrameFile(folder / files.FRAMES, recorder, toml, schemes.ledger_names(scene)) as sink:
                 recorder.sink = sink
                 del recorder.held[:-1]  # the file has them
-                probes = (f"{files.PROBE}{name}.csv" for name in events.probes_of(scenario))
+                probes = (f"{files.PROBE}{name}.csv" for name in model.probes)
                 files.clear_remains(folder, (files.FINAL, files.SOILS, files.SUMMARY, *probes))  # of the part before
                 periods = precautions.periods(recorder.time_step)
                 seconds = precautions.checkpoint_seconds
@@ -189,7 +191,7 @@ def simulate_into(
                 )
                 with_writer, since = replace(control, checkpoints=writer), stored and stored.head.position
                 ended = loop.run_loop(scene, recorder, scenario.time.end, team=team, control=with_writer, since=since)
-            result = _result(scenario, recorder, ended, time.perf_counter() - began, settled)
+            result = _result(model, recorder, ended, time.perf_counter() - began, settled)
             altered, warnings = recorder.altered, (*resumption.remarks, *result.summary.warnings)
             if altered:
                 more = f" and {len(altered) - 1} more" if len(altered) > 1 else ""
@@ -205,44 +207,44 @@ def simulate_into(
             return results.keep_result(result, result.summary.model_copy(update=whole_run), folder)
 
 
-def _compiled(scenario: Scenario, listener: RunCallbacks = NO_CALLBACKS) -> float:
+def _compiled(model: Model, listener: RunCallbacks = NO_CALLBACKS) -> float:
     """Compile what a run needs and return the seconds it took, which are no part of the run. Raises OutputError."""
     began = time.perf_counter()
-    kernels = schemes.kernels_of(scenario)
+    kernels = schemes.kernels_of(model.scenario)
     listener.on_start(kernels)
     schemes.compile_kernels(kernels)
-    if scenario.systems:  # these need code of their own
+    if model.scenario.systems:  # these need code of their own
         with compiler.compiling():
-            schemes.measure_row(schemes.ALONE.advance(schemes.build(scenario).scene, 0)[0])
+            schemes.measure_row(schemes.ALONE.advance(schemes.build(model), 0)[0])
     return time.perf_counter() - began
 
 
 @contextmanager
 def _attended(
-    scenario: Scenario, built: build.InitialScene, threads: int, limit: WallTime, on_progress: loop.Watcher
+    model: Model, scene: schemes.AnyScene, threads: int, limit: WallTime, on_progress: loop.Watcher
 ) -> Iterator[tuple[instruments.Recorder, schemes.Team, loop.RunControl]]:
     """Give what records a run, its threads and events, and what stops it: a signal, or the limit of wall time."""
-    step, output, others = float(built.scene.world.controls[0].step), scenario.output, systems.others_of(scenario)
-    probes = instruments.probes_of(scenario, built.placed, step, schemes.ledger_names(built.scene))
-    support = observables.MovingSupport(scenario)
+    step, output = float(scene.world.controls[0].step), model.scenario.output
+    others, probes = systems.others_of(model), instruments.probes_of(model, step, schemes.ledger_names(scene))
+    support = observables.MovingSupport(model)
     recorder = instruments.Recorder(
-        built.placed, output.every, step, others=others, contacts=output.contacts, probes=probes, support=support
+        model.bodies, output.every, step, others=others, contacts=output.contacts, probes=probes, support=support
     )
-    timeline = loop.Timeline(scenario, built.placed, step) if scenario.events else None
+    timeline = loop.Timeline(model, step) if model.scenario.events else None
     elements = sum(one.count for one in others)
-    with stop_requests() as requests, schemes.team_for(built.scene, threads, elements) as team:
+    with stop_requests() as requests, schemes.team_for(scene, threads, elements) as team:
         control = loop.RunControl(on_progress, lambda: requests.reason() or limit.reason(), timeline=timeline)
         yield recorder, team, control
 
 
 def _result(
-    scenario: Scenario,
+    model: Model,
     recorder: instruments.Recorder,
     ended: loop.LoopResult,
     seconds: float,
     settled: results.RestState | None,
 ) -> results.Result:
-    frames = recorder.frames()
+    scenario, frames = model.scenario, recorder.frames()
     world, step = ended.scene.world, recorder.time_step
     steps, ground = int(world.clock[0].steps), world.bodies[-1]
     sunk = ended.overlap if ended.code == arrays.OVERLAP_LIMIT else 0.0
@@ -259,8 +261,8 @@ def _result(
         status=outcome.status,
         reason=outcome.reason,
         exit_code=outcome.exit_code,
-        run=provenance.run_hash(scenario),
-        scenario_hash=scenario_hash(scenario),
+        run=provenance.run_hash(model),
+        scenario_hash=model.hash,
         final_state_sha256=provenance.state_hash(ended.scene),
         steps=steps,
         time_step_s=step,
@@ -278,7 +280,7 @@ def _result(
         settled=settled,
         events=ended.events,
         movement=movement,
-        warnings=tuple(_warnings(scenario, recorder.placed, ended, settled)),
+        warnings=tuple(_warnings(model, ended, settled)),
         environment=provenance.environment(),
     )
     probes = recorder.probes.series()
@@ -309,10 +311,9 @@ def _convergence_warnings(scenario: Scenario, found: results.ImpulseConvergence 
         )
 
 
-def _warnings(
-    scenario: Scenario, placed: Sequence[PlacedBody], ended: loop.LoopResult, settled: results.RestState | None
-) -> Iterator[str]:
-    yield from check.implausible_values(scenario, placed)
+def _warnings(model: Model, ended: loop.LoopResult, settled: results.RestState | None) -> Iterator[str]:
+    scenario, placed = model.scenario, model.bodies
+    yield from model.implausible_values
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > balance.RESIDUAL_PROMISE:
         yield f"relative energy error {residual:.1e}, above {balance.RESIDUAL_PROMISE:g}"
@@ -321,7 +322,7 @@ def _warnings(
     if every < (1.0 - memory.ROUNDING) * float(ended.scene.world.controls[0].step):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     yield from _convergence_warnings(scenario, convergence_of(ended.scene))
-    yield from systems.warnings_of(scenario)
+    yield from systems.warnings_of(model)
     for number in ended.pending if ended.outcome.status == "finished" else ():
         what = events.describe_event(scenario.events[number])
         yield f"events.{number} has not happened, as nothing came to rest: {what}"
@@ -329,4 +330,4 @@ def _warnings(
         sunk = schemes.scheme_of(ended.scene).warning(ended.scene, ended.overlap, placement.smallest_width(placed))
         if sunk:
             yield sunk
-    yield from _onset_warnings(scenario, placed, ended.scene.world, settled)
+    yield from _onset_warnings(model, ended.scene.world, settled)

@@ -7,7 +7,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Scenario, geometry, place_bodies
+from blocksim.scenario import Model, geometry
 from blocksim.scenario.models import loads
 from blocksim.world.bodies import Layout, layout_of
 from blocksim.world.joints import Assembly, Floats, applied_forces
@@ -28,12 +28,12 @@ class Blockwork(NamedTuple):
     size: float  # m: half of the diagonal of a box around all
 
     @classmethod
-    def of(cls, scenario: Scenario) -> Self:
+    def of(cls, model: Model) -> Self:
         """Return the structure of a scenario as it is placed. Raises InvalidInputError where statics has no answer."""
-        reason = why_not_sustained(scenario)
+        scenario, reason = model.scenario, why_not_sustained(model)
         if reason:
             raise InvalidInputError(f"statics: {reason}")
-        layout = layout_of(scenario)
+        layout = layout_of(model)
         free = {number for number, body in enumerate(layout.placed) if not body.fixed}
         if not free:
             raise InvalidInputError("statics: no block is free")
@@ -84,13 +84,14 @@ def _friction(layout: Layout, assembly: Assembly) -> Floats:
     return np.array([layout.interactions[a][b].static_friction for a, b in pairs])[assembly.joint]
 
 
-def why_not_sustained(scenario: Scenario) -> str:
+def why_not_sustained(model: Model) -> str:
     """Return in words what else than loads that are the same from time zero on acts in a scenario; empty if nothing."""
-    return next(_others(scenario), "")
+    return next(_others(model), "")
 
 
-def _others(scenario: Scenario) -> Iterator[str]:
+def _others(model: Model) -> Iterator[str]:
     """Yield what acts beside sustained loads."""
+    scenario = model.scenario
     if scenario.systems:
         yield f"{next(iter(scenario.systems))} act on the blocks, whose thrust a run finds"
     if scenario.motion is not None:
@@ -99,7 +100,7 @@ def _others(scenario: Scenario) -> Iterator[str]:
         yield "actuators move the blocks"
     if scenario.events:
         yield "events change the structure"
-    for body in place_bodies(scenario):
+    for body in model.bodies:
         if body.driven:
             yield f"body {body.name} is driven"
         if body.vx or body.vy or body.spin:

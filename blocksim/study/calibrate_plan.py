@@ -19,7 +19,7 @@ from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, OutputError, OutputExistsError, Problem, ScenarioError
 from blocksim.extras import load_module
 from blocksim.options import Option, silent
-from blocksim.scenario import Document, Scenario, Sweep, input_files, overrides, scenario_hash, units
+from blocksim.scenario import Document, Model, Scenario, Sweep, input_files, overrides, scenario_hash, units
 from blocksim.scenario.models.study import Normal, Uniform, toml_number
 from blocksim.simulation import files, provenance
 from blocksim.study import compare, plan as plans
@@ -272,11 +272,12 @@ def calibration_plan(document: Document, options: CalibrateOptions) -> Calibrati
     fits = plans.build_distributions(document, fit, FIT, MODE)
     scattered = plans.distributions_of(document, scatter, SCATTER, MODE)
     bare = document.without_sweep()
-    base = bare.build()
+    model = Model(bare)
+    base = model.scenario
     if base.experiment is None:
         how = "give a table with --experiment"
         raise InputMissingError(f"{document.source.where}: the scenario names no experiment; {how}")
-    check_experiment(base)
+    check_experiment(model)
     _refuse_unfit(fits, scattered, fit, scatter)
     if scattered is None and options.members > 1:
         raise InvalidInputError(NO_SCATTER)

@@ -17,7 +17,7 @@ from blocksim.analysis.compare import plain
 from blocksim.analysis.curves import STIFF, CurveTable, Envelope
 from blocksim.errors import InvalidInputError
 from blocksim.notebook import Shown
-from blocksim.scenario import Scenario, events, place_bodies, placement
+from blocksim.scenario import Model, Scenario, events, placement
 from blocksim.scenario.models.actuators import Actuator
 from blocksim.scenario.models.loads import Force
 from blocksim.simulation import Result, read_result
@@ -129,7 +129,7 @@ def capacity(run: Result | Path | str) -> CapacityAnswer:
 
 def _capacities(result: Result) -> Iterator[Capacity]:
     scenario, records = result.scenario, records_of(result.probes)
-    side = placement.smallest_width(place_bodies(scenario))
+    side = placement.smallest_width(result.model.bodies)
     for name, actuator in zip(events.actuator_names(scenario), scenario.actuators, strict=True):
         record = records[name]
         far = float(np.abs(record["head"]).max(initial=0.0))
@@ -199,11 +199,11 @@ def bound_of(scenario: Scenario, actuator: Actuator, sign: float) -> float:
     blockwork, programme = (solver_module(f"statics.{name}") for name in ("blockwork", "programme"))
     alone = scenario.model_copy(update={"actuators": ()})
     with suppress(InvalidInputError):
-        at_rest = blockwork.Blockwork.of(alone)
+        at_rest = blockwork.Blockwork.of(Model(alone))
         weight = float(at_rest.gravity * at_rest.masses.sum()) or 1.0  # N: a small force is round-off beside it
         force = {"body": actuator.body, "magnitude": sign * weight, "direction": f"{actuator.direction!r} rad"}
         unit = Force.model_validate({"kind": "force", "point": actuator.point, **force})
-        pushed = blockwork.Blockwork.of(alone.model_copy(update={"loads": (*scenario.loads, unit)}))
+        pushed = blockwork.Blockwork.of(Model(alone.model_copy(update={"loads": (*scenario.loads, unit)})))
         found = programme.Programme(at_rest).greatest(at_rest.forces, pushed.forces - at_rest.forces)
         if found is not None and found.factor > 0.0:
             return weight * float(found.factor)

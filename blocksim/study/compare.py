@@ -11,7 +11,7 @@ from blocksim.analysis.experiment import has_curves, load_table
 from blocksim.analysis.metrics import Judgement, Settings, judge
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.options import Option
-from blocksim.scenario import Scenario, load_scenario, load_stored
+from blocksim.scenario import Model, load_scenario, load_stored
 from blocksim.simulation import Result, files, results
 from blocksim.study import manifest, rows, run_folder, sweep_folder
 
@@ -101,19 +101,19 @@ def compare_run(
     """
     final: Columns | pd.DataFrame
     drawn: Result | Path | None = None
-    was: Scenario | None = None
+    was: Model | None = None
     if isinstance(run, Result):
         name, summary, final, named = run.name, run.summary, run.columns, run.experiment
-        drawn, was = run, run.scenario
+        drawn, was = run, run.model
     elif not isinstance(run, Path | str):
         name, summary, final, named = "", None, run, None
     else:
         drawn = folder = run_folder.find_run(run)
         name, summary = str(folder), results.read_summary(folder / files.SUMMARY)
-        was = load_stored(folder / files.SCENARIO)
+        was = Model.stored(folder / files.SCENARIO)
         final = results.read_final(folder, was) if summary.status == rows.FINISHED else {}
         # a scenario file may name another table by now than it did when it was run
-        now = (load_scenario(run) if Path(run).is_file() else was).experiment
+        now = (load_scenario(run) if Path(run).is_file() else was.scenario).experiment
         named = now.table if now else None
     if summary is not None and summary.status != rows.FINISHED:
         how = f"this run {'was' if summary.status == 'interrupted' else 'has'} {summary.status} ({summary.reason})"

@@ -15,7 +15,7 @@ two outcomes is no error of discretisation: it has no order, and that it shrinks
 """
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from blocksim.analysis.experiment import load_table
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.options import Option, silent, takes
-from blocksim.scenario import Scenario, Source, load_scenario, place_bodies, placement
+from blocksim.scenario import Model, PlacedBody, Scenario, Source, load_scenario, placement
 from blocksim.simulation import files, interruption, provenance, results, schemes
 from blocksim.study import pictures
 from blocksim.study.answer import Overview, UnstoredResult
@@ -253,9 +253,8 @@ class Convergence(UnstoredResult):
 class Coordinates:
     """Final states as points in a space whose largest coordinate difference is the distance defined above (mm)."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, placed: Sequence[PlacedBody]) -> None:
         """Learn names and sizes of the blocks."""
-        placed = place_bodies(scenario)
         self.blocks = tuple(body.name for body in placed)
         self._reach = np.array([MILLI * body.radius for body in placed])
         self._longest = MILLI * np.array([(body.size_x, body.size_y) for body in placed]).max(axis=1)
@@ -400,8 +399,9 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     if not tolerance_mm > 0.0 or levels < FEWEST_LEVELS:
         raise InvalidInputError(f"the tolerance must be above 0 mm and levels {FEWEST_LEVELS} or more")
     scenario = scenario.model_copy(update={"sweep": None})
-    check_experiment(scenario)
-    schemes.build_scene(scenario)
+    model = Model(scenario)
+    check_experiment(model)
+    schemes.build(model)
     refinements = refinements_of(scenario, studies)
     schemes.compile_kernels(schemes.kernels_of(scenario))
     folder = Path(options.out) if options.out is not None else files.RESULTS / scenario.name / "converge"
@@ -424,13 +424,14 @@ class LevelRuns:
     def __init__(self, scenario: Scenario, folder: Path, jobs: int, on_run: OnRun) -> None:
         """Run nothing yet."""
         self.scenario, self.folder, self.jobs, self.on_run = scenario, folder, jobs, on_run
-        self.coordinates = Coordinates(scenario)
+        self.coordinates = Coordinates(Model(scenario).bodies)
         self.rows: dict[str, Row] = {}
 
-    def run(self, scenarios: dict[str, Scenario]) -> list[Row]:
+    def run(self, scenarios: Mapping[str, Scenario]) -> list[Row]:
         """Return the rows of scenarios, after running what has not run yet; the keys are labels for people."""
-        names = [provenance.run_hash(scenario) for scenario in scenarios.values()]
-        named = dict(zip(reversed(names), reversed(scenarios.items()), strict=True))  # the first label of each
+        models = {label: Model(scenario) for label, scenario in scenarios.items()}
+        names = [provenance.run_hash(model) for model in models.values()]
+        named = dict(zip(reversed(names), reversed(models.items()), strict=True))  # the first label of each
         missing = [name for name in dict.fromkeys(names) if name not in self.rows]
         tasks = [Task(number, name, {}, named[name][1]) for number, name in enumerate(missing)]
         jobs = min(self.jobs, len(tasks))
@@ -520,8 +521,9 @@ def _possible(scenario: Scenario) -> list[Refinement]:
     """Return what can be refined, and how: by halves, or by half decades, also from coarser values that are cheap."""
     time, contact = scenario.time, scenario.contact
     if time.has_rigid_contacts:
-        step = float(schemes.build_scene(scenario).world.controls[0].step)  # as given or as it was chosen
-        tolerance = velocity_tolerance(scenario, len(place_bodies(scenario)))
+        model = Model(scenario)
+        step = float(schemes.build(model).world.controls[0].step)  # as given or as it was chosen
+        tolerance = velocity_tolerance(scenario, len(model.bodies))
         key = "time.velocity_tolerance"
         return [
             _halved(scenario, "time.step", step),
@@ -562,6 +564,6 @@ def _halved(scenario: Scenario, key: str, own: float) -> Refinement:
         changed = with_setting(scenario, key, halved.value(-coarser))
         with suppress(ValueError, InvalidInputError):
             type(changed.time).model_validate(changed.time.model_dump())
-            schemes.build_scene(changed)
+            schemes.build(Model(changed))
             return replace(halved, coarser=coarser)
     return halved

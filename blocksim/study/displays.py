@@ -15,7 +15,7 @@ from blocksim.analysis.compare import Comparison
 from blocksim.analysis.metrics import Judgement
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.notebook import Shown
-from blocksim.scenario import Scenario, place_bodies
+from blocksim.scenario import Model, Scenario
 from blocksim.simulation import Result, files
 from blocksim.simulation.instruments import FrameRows, frames_from_rows
 from blocksim.study import answer, pictures, report, run_folder
@@ -206,7 +206,7 @@ def _subject(shown: Any) -> Any:
 
 def _stored(run: Result) -> Callable[[], run_folder.StoredRun]:
     return lambda: run_folder.StoredRun(
-        run.folder or Path(), run.scenario, run.frames, run.summary.events, "", lambda: run.probes
+        run.folder or Path(), run.model, run.frames, run.summary.events, "", lambda: run.probes
     )
 
 
@@ -226,10 +226,11 @@ def _draw_scenario(scenario: Scenario, options: pictures.PlotOptions) -> None:
         return
     if options.kind not in {None, FINAL}:
         raise InvalidInputError(f"{options.kind}: a scenario is drawn as {FINAL} or {MOTION}; run it for others")
-    systems = (block_system(place_bodies(scenario)), *others_of(scenario))
+    model = Model(scenario)
+    systems = (block_system(model.bodies), *others_of(model))
     states = tuple(np.stack([one.elements.start] * len(SIZES)) for one in systems)
     frames = frames_from_rows(systems, 0.0, FrameRows(np.arange(len(SIZES)), states, SIZES, ()))
-    start = run_folder.StoredRun(Path(), scenario, frames, (), "", dict)
+    start = run_folder.StoredRun(Path(), model, frames, (), "", dict)
     pictures.draw_run(lambda: start, replace(options, kind=FINAL, times=(0.0,)))
 
 

@@ -31,7 +31,7 @@ from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit, in
 from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.extras import load_module
 from blocksim.options import Option, Overwrite, silent, takes
-from blocksim.scenario import Document, Source, Sweep, document_of, overrides, scenario_hash
+from blocksim.scenario import Document, Model, Source, Sweep, document_of, overrides
 from blocksim.scenario.models.study import Uniform, Variation
 from blocksim.simulation import observables, provenance, schemes
 from blocksim.study import criterion, executors, limit_plan, manifest, plan as plans, rows, sweep, sweep_folder
@@ -151,7 +151,7 @@ class FragilityPlan:
         """A hash of all that decides a member; neither their number nor what counts as failure does."""
         levels = [self.head.key, *map(str, self.levels.values())]
         scatter = None if self.scatter is None else self.scatter.as_table()
-        about = [scenario_hash(self.document.build()), levels, scatter, self.seed, provenance.code_hash()]
+        about = [Model(self.document).hash, levels, scatter, self.seed, provenance.code_hash()]
         if self.stripes:
             about.append({key: list(map(str, values)) for key, values in self.stripes.items()})
         tables = plans.table_digests(self.document, self.spread)
@@ -443,10 +443,10 @@ def run_fragility(
     shard, execution = options.shard, execution or options
     sweep.refuse_loss(shard, overwrite=options.overwrite)
     rounds, setting = execution.ready()
-    base = plan.document.build()
+    base = Model(plan.document)
     cases, kind = plan.cases, FragilityAnswer.files
     folder = sweep.make_folder(options.out, base, kind, plan.name, overwrite=options.overwrite)
-    schemes.compile_kernels(schemes.kernels_of(base))
+    schemes.compile_kernels(schemes.kernels_of(base.scenario))
     with closing(manifest.Manifest(folder / shard.file(manifest.MANIFEST), "fragility study")) as kept, rounds() as run:
         share = sweep.SweepRun(cases, shard, kept, options.on_row, kind=kind, table=MEMBERS_TABLE)
         share.run(run, setting, retry_failed=options.retry_failed)

@@ -37,7 +37,7 @@ rests within 1e-8 of gravity, and where supports move a limit is none of rest.
 
 import math
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -45,7 +45,7 @@ from typing import Any
 
 from blocksim.errors import InvalidInputError, OutputError, StoppedEarlyError
 from blocksim.options import silent, takes
-from blocksim.scenario import Document, Scenario, Source, document_of, laws, motion, place_bodies, placement
+from blocksim.scenario import Document, Model, PlacedBody, Source, document_of, laws, motion, placement
 from blocksim.scenario.models import timeline
 from blocksim.simulation import observables, provenance, rest_state, schemes
 from blocksim.study import limit_answer, limit_plan, manifest, sweep, sweep_folder
@@ -118,10 +118,10 @@ def find_limit(
     """
     if options.stiffer:
         refuse_without_springs(plan)
-    base, kind, execution = plan.scenario_at(plan.span.low), limit_answer.LimitAnswer.files, execution or options
+    base, kind, execution = plan.model_at(plan.span.low), limit_answer.LimitAnswer.files, execution or options
     overwrite = options.overwrite
     with sweep.runs_of(
-        plan.document, base, options.out, kind, plan.name, execution, overwrite=overwrite, peaks=True
+        plan.model, base, options.out, kind, plan.name, execution, overwrite=overwrite, peaks=True
     ) as runs:
         answer = _Search(plan, runs, options.stiffer, options.on_run, on_other).answer()
         answer.write()  # first: the runs beside it may not fit on the disk
@@ -139,7 +139,7 @@ def find_curve(
     if options.stiffer:
         refuse_without_springs(*plan.searches.values())
     one = next(iter(plan.searches.values()))
-    base, kind = one.scenario_at(one.span.low), limit_answer.CurveAnswer.files
+    base, kind = one.model_at(one.span.low), limit_answer.CurveAnswer.files
     name = manifest.short_hash([plan.head.key, *(search.name for search in plan.searches.values())])
     folder = sweep.make_folder(options.out, base, kind, name, overwrite=options.overwrite)
     found: dict[float, limit_answer.LimitAnswer] = {}
@@ -226,22 +226,22 @@ class StandingSide:
         """Take a change of a search and all its rows."""
         self.plan, self.change = plan, change
         self.value = change.high if change.below is Stability.FALLS else change.low
-        self.scenario, row = plan.scenario_at(self.value), rows[self.value]
+        self.model, row = plan.model_at(self.value), rows[self.value]
         self.give: limit_answer.Give | None = None  # how far springs have given way, where what stands there says so
         if plan.scenario.time.has_springs and row.get("outcome") == STANDS:  # what rocked back has turned too
             turn = max(abs(float(str(row[name]))) for name in row if name.endswith(".rotation_deg"))
             # of the load k that topples a block by k g along the ground, atan k = a, a turn d takes away 2 d/sin(2 a) k
-            slope = (float(self.scenario.ground.tilt) or math.inf) if plan.key == TILT else 0.5
+            slope = (float(self.model.scenario.ground.tilt) or math.inf) if plan.key == TILT else 0.5
             self.give = limit_answer.Give(self.value, turn, math.radians(turn) / slope)
 
     @property
     def most_shift(self) -> float:
         """A bound of the share of a limit that springs take away, by their load and how slender blocks are."""
-        scenario = self.scenario
-        slender = slenderness(scenario)
+        scenario, placed = self.model.scenario, self.model.bodies
+        slender = slenderness(placed)
         if self.give is not None:
             return max(self.give.share, 2.0 * math.radians(self.give.turn) / slender)
-        placed = place_bodies(scenario)  # the softest contact gives way under the weight of all free blocks
+        # the softest contact gives way under the weight of all free blocks
         weight = scenario.gravity * sum(body.mass for body in placed if not body.fixed)
         table = interactions_of(scenario, contact_classes(scenario, placed))
         springs = (pair for row in table for pair in row if pair.normal_stiffness > 0.0)
@@ -256,8 +256,8 @@ class StandingSide:
 
         `probed` is the share within which stiffer springs were searched; with `as_given` the limit is that of springs.
         """
-        plan, scenario = self.plan, self.scenario
-        rest = rest_acceleration(scenario, plan.criterion.least_moved)
+        plan, scenario = self.plan, self.model.scenario
+        rest = rest_acceleration(self.model, plan.criterion.least_moved)
         if rest:  # over gravity it is a share of a tilt (rad), of a coefficient; of one for other keys
             is_coefficient = any(part in plan.key for part in COEFFICIENTS) or plan.key.startswith("loads.")
             load = 1.0
@@ -276,9 +276,9 @@ class StandingSide:
         return limit_answer.Margin(rest=rest, springs=self.most_shift if self.give is None else self.give.share)
 
 
-def slenderness(scenario: Scenario) -> float:
+def slenderness(bodies: Iterable[PlacedBody]) -> float:
     """Return sin(2 a) of the most slender block or of all of them together, tan a = width/height; 1 for squat ones."""
-    placed = [body for body in place_bodies(scenario) if not body.fixed]
+    placed = [body for body in bodies if not body.fixed]
     sizes = [(body.size_x, body.size_y) for body in placed]
     xs = [body.x + side * body.size_x for body in placed for side in (-0.5, 0.5)]
     ys = [body.y + side * body.size_y for body in placed for side in (-0.5, 0.5)]
@@ -286,17 +286,15 @@ def slenderness(scenario: Scenario) -> float:
     return min(math.sin(2.0 * math.atan2(min(width, height), height)) for width, height in sizes)
 
 
-def rest_acceleration(scenario: Scenario, least_moved: float | None) -> float:
+def rest_acceleration(model: Model, least_moved: float | None) -> float:
     """Return the acceleration (m/s2) below which a run cannot be told from rest; `least_moved` (m) is the criterion's.
 
     Zero where blocks settle before time zero, supports move, or nothing pulls.
     """
-    time = scenario.time
+    scenario, time = model.scenario, model.scenario.time
     if motion.settles(scenario) or scenario.motion is not None or not scenario.gravity > 0.0:
         return 0.0
-    moved = observables.MOVED_SHARE * placement.smallest_width(
-        body for body in place_bodies(scenario) if not body.fixed
-    )
+    moved = observables.MOVED_SHARE * placement.smallest_width(body for body in model.bodies if not body.fixed)
     way = moved if least_moved is None else least_moved
     of_end = min(2.0 * way, moved / observables.FURTHER) / time.end**2
     hold = max(time.rest_hold, 0.0)
@@ -364,8 +362,8 @@ class _Search:
         """
         plan, verdicts = self.plan, dict[Number, Stability]()
         while values := limit_plan.next_near(plan.span, verdicts, near, plan.tolerance):
-            scenarios = {value: plan.scenario_at(value) for value in values}
-            rests = {at: rest_state.rests(one) if motion.settles(one) else None for at, one in scenarios.items()}
+            models = {value: plan.model_at(value) for value in values}
+            rests = {at: rest_state.rests(one) if motion.settles(one.scenario) else None for at, one in models.items()}
             verdicts |= {at: STOOD[one] for at, one in rests.items() if one is not None}
             if None in rests.values():
                 break
@@ -457,7 +455,7 @@ class _Search:
     def _half(self, change: Change[Stability]) -> limit_answer.HalfStep:
         """Search a limit with half the time step."""
         ends = (change.low, change.high)
-        steps = (schemes.build(self.plan.scenario_at(value)).scene.world.controls[0].step for value in ends)
+        steps = (schemes.build(self.plan.model_at(value)).world.controls[0].step for value in ends)
         step = HALF * float(min(steps))
         found = self._again(replace(self.plan, apart={limit_answer.STEP: step}), change, self.step_rows, step)
         if found is None:
@@ -469,7 +467,7 @@ class _Search:
 
         A step given by hand is shorter with stiffer springs, in proportion.
         """
-        change, scenario = side.change, self.plan.scenario_at(side.change.low)
+        change, scenario = side.change, self.plan.model_at(side.change.low).scenario
         first = scale = scenario.contact.stiffness_scale
         given = limit_answer.StiffnessLevel(stiffness_scale=scale, low=change.low, high=change.high)
         levels = Levels(
@@ -514,13 +512,13 @@ def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
         falls = falls_before_zero(side.model_dump())
         if side.value in sides or not (falls or side.status == FINISHED):
             continue
-        scenario = plan.scenario_at(side.value)
+        scenario = plan.model_at(side.value).scenario
         release = {"release": "always" if falls else "at rest"}
         changed = {"output": {"contacts": True}, "start": release, "time": {"stop_at_rest": False} if falls else {}}
         tables = {name: getattr(scenario, name).model_copy(update=update) for name, update in changed.items()}
-        scenario = scenario.model_copy(update=tables)  # not stopped where it is slow: so it may begin
-        name = provenance.run_hash(scenario)
-        row = ensemble.run_case(scenario, answer.folder / sweep_folder.CASES / name)
+        model = Model(scenario.model_copy(update=tables))  # not stopped where it is slow: so it may begin
+        name = provenance.run_hash(model)
+        row = ensemble.run_case(model, answer.folder / sweep_folder.CASES / name)
         if row["status"] == ensemble.INTERRUPTED:
             raise StoppedEarlyError("stopped while the runs beside a limit were kept; rerun the command to finish")
         if row["status"] != FINISHED and not (falls and "outcome" in row):

@@ -394,7 +394,7 @@ class LimitAnswer(RangeAnswer, frozen=True):
         came = side.outcome or ""
         if first is not None:
             came = f"{came}; first to move: block {first} at {side.first_moved_s or 0.0:.3g} s"
-        support, is_mechanism = run_data.support_of(run.scenario, run.events), side.verdict is not Stability.STANDS
+        support, is_mechanism = run_data.support_of(run.model, run.events), side.verdict is not Stability.STANDS
         picture = mechanism.BracketRun(run.frames, support, first, head, is_mechanism=is_mechanism)
         return replace(picture, caption=f"{head}\n{came} (drawn at {float(run.frames.time[picture.frame]):.3g} s)")
 

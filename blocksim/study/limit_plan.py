@@ -23,7 +23,7 @@ from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.options import Option, Overwrite, silent, takes
-from blocksim.scenario import Document, Scenario, overlap, overrides, place_bodies, scenario_hash, units
+from blocksim.scenario import Document, Model, Scenario, overlap, overrides, units
 from blocksim.scenario.models import study, timeline
 from blocksim.scenario.models.loads import stretches_of
 from blocksim.scenario.placement import smallest_width
@@ -281,9 +281,10 @@ def next_near(span: SearchRange, known: Mapping[Number, Kind], near: Change[Kind
     return [] if known[low] not in (near.below, near.above) or beyond in known else [beyond]
 
 
-def has_passed(scenario: Scenario) -> bool:
+def has_passed(model: Model) -> bool:
     """Return True where less acts on blocks at the end than before, so that what rocks then may come to rest yet."""
-    if moves_supports(scenario) or any(body.vx or body.vy or body.spin for body in place_bodies(scenario)):
+    scenario = model.scenario
+    if moves_supports(scenario) or any(body.vx or body.vy or body.spin for body in model.bodies):
         return True
     values = ([abs(one.value) for one in stretches_of(load, scenario.ground.tilt)] for load in scenario.loads)
     return any(max(of_load) > of_load[-1] for of_load in values)
@@ -294,12 +295,11 @@ def moves_supports(scenario: Scenario) -> bool:
     return scenario.motion is not None or any(body.motion is not None for body in scenario.bodies)
 
 
-def is_sustained(scenario: Scenario) -> bool:
+def is_sustained(model: Model) -> bool:
     """Return True where loads are the same from time zero on, nothing moves then, and no block is to drop."""
-    if why_not_sustained(scenario):
+    if why_not_sustained(model):
         return False
-    placed = place_bodies(scenario)
-    dropped, _ = overlap.unsupported(scenario, placed, NEAR * smallest_width(placed))
+    dropped, _ = overlap.unsupported(model.scenario, model.bodies, NEAR * smallest_width(model.bodies))
     return not dropped
 
 
@@ -346,9 +346,14 @@ class LimitPlan:
     apart: Mapping[str, object] = field(default_factory=dict)  # settings in which its runs differ from the document
 
     @cached_property
+    def model(self) -> Model:
+        """What the document describes."""
+        return Model(self.document)
+
+    @property
     def scenario(self) -> Scenario:
         """The scenario of the document."""
-        return self.document.build()
+        return self.model.scenario
 
     @property
     def moves_supports(self) -> bool:
@@ -369,9 +374,9 @@ class LimitPlan:
         """Return what distinguishes the run of a value from the document."""
         return {**setting(self.key, number, self.unit, is_whole=self.span.is_whole), **self.apart}
 
-    def scenario_at(self, number: Number) -> Scenario:
-        """Return the scenario at a value. Raises ScenarioError where the value does not go with the others."""
-        return self.document.with_values(self.settings(number)).build()
+    def model_at(self, number: Number) -> Model:
+        """Return what is run at a value. Raises ScenarioError where the value does not go with the others."""
+        return self.model.varied(self.settings(number))
 
     def verdicts(
         self, rows: Mapping[Number, Row], undecided: Stability = Stability.UNDECIDED
@@ -386,13 +391,13 @@ class LimitPlan:
         while values := next_values(self.span, known, self.tolerance):
             known |= {value: value < middle for value in values}
         settings = [self.settings(value) for value in sorted(known)]
-        return Cases(self.document, Design({key: [one[key] for one in settings] for key in settings[0]}), ())
+        return Cases(self.model, Design({key: [one[key] for one in settings] for key in settings[0]}), ())
 
     @property
     def name(self) -> str:
         """A hash of everything that decides the answer."""
         ends = [self.key, self.unit, *vars(self.span).values(), self.criterion.text, self.tolerance]
-        return manifest.short_hash([scenario_hash(self.scenario), ends, code_hash()])
+        return manifest.short_hash([self.model.hash, ends, code_hash()])
 
 
 class CurvePlan(NamedTuple):
@@ -454,7 +459,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
     at_ends = []
     for number in (low, high):
         try:
-            at_ends.append(plan.scenario_at(number))
+            at_ends.append(plan.model_at(number))
         except BlocksimError as error:
             message = f"{key} = {answer.with_unit(number, unit)}: {str(error).splitlines()[0]}"
             raise InvalidInputError(message) from error

@@ -14,7 +14,7 @@ from blocksim.analysis.evidence import Members
 from blocksim.analysis.experiment import ExperimentTable, has_curves, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.options import Option, Replace, silent, takes
-from blocksim.scenario import Scenario, input_files, load_scenario, load_stored, overrides, spelling, units
+from blocksim.scenario import Model, Scenario, input_files, load_scenario, load_stored, overrides, spelling, units
 from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.simulation import files
 from blocksim.study import answer, capacity, compare, manifest, run_folder, sweep_folder
@@ -352,14 +352,14 @@ def draw_run(find: Callable[[], run_folder.StoredRun], options: PlotOptions) -> 
     asked = scene.PictureOptions(
         scenario.name,
         measured,
-        run_data.support_of(scenario, stored.events, stored.probes() if scenario.actuators else {}),
+        run_data.support_of(stored.model, stored.events, stored.probes() if scenario.actuators else {}),
         forces=options.forces,
         times=options.times,
         count=options.frames,
         panels=options.panels or (),
         blocks=options.blocks or (),
         relative=options.relative,
-        paint=paints.paint_of(options.colour, stored.frames, scenario),
+        paint=paints.paint_of(options.colour, stored.frames, stored.model),
         paper=options.paper,
     )
     draw(stored.frames, picture, asked)
@@ -374,7 +374,7 @@ def draw_motion(find: Callable[[], Scenario], options: PlotOptions) -> Path:
     options.refuse(MOTION, f"this picture is of kind {MOTION}")
     scenario = find()
     picture = options.picture(f"{scenario.name}_{MOTION}.png")
-    support = run_data.support_of(scenario)
+    support = run_data.support_of(Model(scenario))
     time_panels.draw_support_motion(support, scenario.time.end, picture, f"{scenario.name}: motion", options.paper)
     return picture
 
@@ -416,9 +416,9 @@ def draw_film(place: Path, options: AnimateOptions) -> tuple[Path, str, str]:
 def animate_run(stored: run_folder.StoredRun, path: Path, options: AnimateOptions) -> tuple[int, str]:
     """Write a run as an animation; return the number of frames, and which blocks leave the view."""
     scenario = stored.scenario
-    paint = paints.paint_of(options.colour, stored.frames, scenario)
+    paint = paints.paint_of(options.colour, stored.frames, stored.model)
     look = animation.Look(options.width, options.trails, scenario.name, options.forces, paint)
-    support = run_data.support_of(scenario, stored.events, stored.probes() if scenario.actuators else {})
+    support = run_data.support_of(stored.model, stored.events, stored.probes() if scenario.actuators else {})
     pace = animation.Pace(options.speed, options.fps)
     return animation.draw_animation(stored.frames, path, pace, look, support, options.on_picture)
 

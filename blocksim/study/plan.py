@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError, InvalidInputError, Problem, ScenarioError
 from blocksim.extras import load_module
 from blocksim.options import Option
-from blocksim.scenario import Document, Scenario, Sweep, overrides, scenario_hash, units
+from blocksim.scenario import Document, Model, Scenario, Sweep, overrides, units
 from blocksim.scenario.check import MAX_VARIED, trial_of, variation_fault
 from blocksim.scenario.input_files import NUMBER, TableCell, raise_problems, read_table
 from blocksim.scenario.mistakes import Mistake
@@ -258,28 +258,28 @@ ROW, ROW_OF_BLOCK = 570, 230
 
 @dataclass(frozen=True)
 class SweepCase:
-    """One member of a sweep: the values of its keys, and its scenario or the reason why it has none."""
+    """One member of a sweep: the values of its keys, and its model or the reason why it has none."""
 
     settings: Settings
-    scenario: Scenario | None
+    model: Model | None
     problem: str = ""
     name: str = ""  # hash of its run
 
     @classmethod
-    def of(cls, document: Document, values: Settings) -> "SweepCase":
-        """Build the scenario of a document with these values."""
+    def of(cls, base: Model, values: Settings) -> "SweepCase":
+        """Vary a model by these values."""
         try:
-            scenario = document.with_values(values).build()
+            model = base.varied(values)
         except BlocksimError as error:  # mistakes that only show in the combination
             return cls(values, None, problem=str(error).splitlines()[0])
-        return cls(values, scenario, name=run_hash(scenario))
+        return cls(values, model, name=run_hash(model))
 
 
 @dataclass(frozen=True)
 class Cases:
     """All cases of a sweep; each is made when it is asked for, and none is kept."""
 
-    document: Document
+    base: Model  # without what is varied
     design: Design
     heads: tuple[Head, ...]  # of the varied keys in the table
 
@@ -288,20 +288,21 @@ class Cases:
         return len(self.design)
 
     def __getitem__(self, number: int) -> SweepCase:
-        return SweepCase.of(self.document, self.design[number])
+        return SweepCase.of(self.base, self.design[number])
 
     def __iter__(self) -> Iterator[SweepCase]:
         return map(self.__getitem__, range(len(self)))
 
 
-def plan_of(base: Scenario) -> Sweep:
+def plan_of(base: Model) -> Sweep:
     """Return what is varied. Raises InvalidInputError where that is nothing, and for a table that does not fit."""
-    if base.sweep is None:
+    sweep = base.scenario.sweep
+    if sweep is None:
         raise InvalidInputError("nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario")
-    if MEASURED in base.sweep.vary:
+    if MEASURED in sweep.vary:
         raise InvalidInputError(f"{MEASURED} cannot be varied; compare --experiment uses another table")
     check_experiment(base)
-    return base.sweep
+    return sweep
 
 
 def with_sweep(
@@ -359,9 +360,10 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
     refuse_wrong_draws(document, sweep, design)
     # what cases are made from has no sweep, and tables that are found, or read, once for all of them
     bare = document.without_sweep()
-    cases = Cases(replace(bare, data=with_tables(bare.data, document.build())), design, heads_of(sweep))
+    base = Model(replace(bare, data=with_tables(bare.data, document.build())))
+    cases = Cases(base, design, heads_of(sweep))
     looked_at = min(len(cases), MOST_LOOKED_AT)
-    if all(cases[number].scenario is None for number in range(looked_at)):
+    if all(cases[number].model is None for number in range(looked_at)):
         which = f"none of the {len(cases)} cases" if looked_at == len(cases) else f"none of the first {looked_at} cases"
         raise InvalidInputError(f"{which} can be simulated; the first: {cases[0].problem}")
     return cases
@@ -400,13 +402,13 @@ def table_digests(document: Document, vary: Mapping[str, Variation]) -> dict[str
 
     A plan that is named by the paths alone would take rows of one record for those of another one of the same name.
     """
-    bare = document.without_sweep()
+    bare = Model(document.without_sweep())
     digests: dict[str, list[str]] = {}
     for key, values in vary.items():
         for value in values if overrides.parse_key(key)[-1] == TABLE and isinstance(values, tuple) else ():
             digest = ""
             with suppress(BlocksimError):  # the case says so
-                digest = scenario_hash(bare.with_values({key: value}).build())
+                digest = bare.varied({key: value}).hash
             digests.setdefault(key, []).append(digest)
     return digests
 
@@ -524,7 +526,7 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
 
     Raises what building the document, its plan or a scene raises, InvalidInputError where nothing is varied.
     """
-    plan = plan_of(document.build())
+    plan = plan_of(Model(document))
     return estimate_of(cases_of(document, plan), tuple(remarks(plan)), keep_cases=keep_cases)
 
 
@@ -536,8 +538,8 @@ def estimate_of(cases: Cases, remarks: tuple[str, ...] = (), *, keep_cases: bool
     if len(cases) > LOOKED_AT:  # a random choice: evenly spaced ones may meet one value of a key only
         numbers = sorted(np.random.default_rng(0).choice(len(cases), LOOKED_AT, replace=False).tolist())
     chosen = [cases[number] for number in numbers]
-    described = [describe(case.scenario) for case in chosen if case.scenario is not None]
-    problems = [case.problem for case in chosen if case.scenario is None]
+    described = [describe(case.model) for case in chosen if case.model is not None]
+    problems = [case.problem for case in chosen if case.model is None]
     share = len(described) / len(chosen)
     rows = [ROW + ROW_OF_BLOCK * len(one.bodies) + keep_cases * (one.bytes + SMALL_FILES) for one in described]
     return Estimate(
@@ -548,6 +550,6 @@ def estimate_of(cases: Cases, remarks: tuple[str, ...] = (), *, keep_cases: bool
         seconds=share * len(cases) * fmean([one.seconds for one in described] or [0.0]),
         bytes=round(share * len(cases) * fmean(rows or [0.0])),
         memory=max((one.memory for one in described), default=0),
-        stop_at_rest=sum(case.scenario.time.stop_at_rest for case in chosen if case.scenario is not None),
+        stop_at_rest=sum(case.model.scenario.time.stop_at_rest for case in chosen if case.model is not None),
         remarks=remarks,
     )

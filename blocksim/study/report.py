@@ -55,7 +55,7 @@ def page_of_result(result: Result, experiment: Path | None = None) -> str:
     """Return the text of the page of a run in memory. Raises as `report` does."""
     text = scenario_to_toml(result.scenario)
     run = parts.PartialRun(
-        Path(result.name), result.scenario, text, result.summary, result.frames, result.columns, probes=result.probes
+        Path(result.name), result.model, text, result.summary, result.frames, result.columns, probes=result.probes
     )
     return page.page_text([parts.run_subject("part-1", run, *_compared(run, experiment))])
 
@@ -99,8 +99,8 @@ def subjects_of(
 
 def _compared(run: parts.PartialRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:
     """Return the comparison of a finished run, or why there is none though there is a measurement."""
-    named = None if run.scenario is None or run.scenario.experiment is None else run.scenario.experiment.table
-    table = experiment or named
+    named = None if run.model is None else run.model.scenario.experiment
+    table = experiment or (named.table if named else None)
     if table is None or run.final is None:
         return None, ()
     if run.status != rows.FINISHED:

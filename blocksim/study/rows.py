@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from blocksim.analysis import compare, curves, experiment
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.scenario import Scenario, Sweep, events, input_files, place_bodies, spelling, units
+from blocksim.scenario import Model, Scenario, Sweep, input_files, spelling, units
 from blocksim.simulation import instruments
 from blocksim.simulation.trajectory import COLUMNS, Columns
 
@@ -206,47 +206,48 @@ CURVES_OF = {
 """Two quantities of each kind of probe with their units, as examples."""
 
 
-def check_experiment(scenario: Scenario, path: Path | str | None = None) -> tuple[str, ...]:
+def check_experiment(model: Model, path: Path | str | None = None) -> tuple[str, ...]:
     """Check that a table, or that which a scenario names, goes with the blocks: better now than after the run.
 
     Returns warnings of measured values that are far from the others.
     """
-    path = path or (scenario.experiment.table if scenario.experiment else None)
+    named = model.scenario.experiment
+    path = path or (named.table if named else None)
     if path is None:
         return ()
-    _refuse_other_columns(scenario, Path(path))
+    _refuse_other_columns(model, Path(path))
     if experiment.has_curves(path):
-        table, known = curves.load_curves(path), events.probes_of(scenario)
+        table, known = curves.load_curves(path), model.probes
         for name in table.curves:
             if name not in known:
-                hint = spelling.did_you_mean_or_list(name, known) if known else f"use {_headers(scenario)}"
+                hint = spelling.did_you_mean_or_list(name, known) if known else f"use {_headers(model)}"
                 raise InvalidInputError(f"{table.source}: unknown probe '{name}', {hint}")
             _refuse_other_quantities(table, name, known[name].kind)
         return table.warnings
-    names = [body.name for body in place_bodies(scenario)]
+    names = [body.name for body in model.bodies]
     unknown = dict.fromkeys(COLUMNS[1:], [0.0] * len(names))
     measured = experiment.load_table(path)
     compare.compare_final({"block": names, **unknown}, measured)
     return measured.warnings
 
 
-def _refuse_other_columns(scenario: Scenario, path: Path) -> None:
+def _refuse_other_columns(model: Model, path: Path) -> None:
     """Refuse a table that has neither final positions nor curves, with the columns that this scenario takes."""
     try:
         table = input_files.read_table(path)
     except InvalidInputError as error:  # whatever reads it says what is wrong in it
         if not str(error).endswith(input_files.EMPTY):
             return
-        raise InvalidInputError(f"{error}; its first line is {_headers(scenario)}") from None
+        raise InvalidInputError(f"{error}; its first line is {_headers(model)}") from None
     names = tuple(head.text for head in table.heads)
     is_curve = names[: len(curves.FIRST)] == curves.FIRST and len(names) == len(curves.FIRST) + 2
     if not is_curve and len({*names} & {*experiment.COLUMNS}) < LEAST_COMMON:
-        input_files.raise_problems([table.header.problem(f"these columns are not known; use {_headers(scenario)}")])
+        input_files.raise_problems([table.header.problem(f"these columns are not known; use {_headers(model)}")])
 
 
-def _headers(scenario: Scenario) -> str:
+def _headers(model: Model) -> str:
     """Return the first lines that a measured table of a scenario may have: of its probes, and of final positions."""
-    named = {probe.kind: name for name, probe in reversed(events.probes_of(scenario).items())}
+    named = {probe.kind: name for name, probe in reversed(model.probes.items())}
     texts = []
     for kind, columns in CURVES_OF.items():
         if kind in named:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.options import Option, Overwrite, silent, takes
-from blocksim.scenario import Scenario, Source, load_scenario
+from blocksim.scenario import Model, Source
 from blocksim.simulation import Result, Watcher, checkpoint, files, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation.results import RESULT_FILES, changed_files, read_summary
 from blocksim.simulation.run import NO_CALLBACKS, RunCallbacks
@@ -40,7 +40,7 @@ class RunOptions:
 
 
 @takes(RunOptions)
-def run(scenario: Source, options: RunOptions) -> Result:
+def run(scenario: Source | Model, options: RunOptions) -> Result:
     """Simulate a scenario and return the result; with `out` it is kept in that folder as well.
 
     A folder that holds the finished run of exactly this scenario and code is read instead, unless `overwrite` is
@@ -56,13 +56,12 @@ def run(scenario: Source, options: RunOptions) -> Result:
     precautions, on_progress = options.precautions, options.on_progress
     if resume and (overwrite or out is None):
         raise ValueError("resume needs out=FOLDER, and cannot be combined with overwrite")
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
-    rows.check_experiment(scenario)
+    model = Model(scenario)
+    rows.check_experiment(model)
     if out is None:
-        return simulate(scenario, threads=threads, on_progress=on_progress, wall_time=precautions.wall_time)
+        return simulate(model, threads=threads, on_progress=on_progress, wall_time=precautions.wall_time)
     folder = Path(out)
-    if not overwrite and files.holds_run(folder, scenario):
+    if not overwrite and files.holds_run(folder, model):
         changed = changed_files(folder, read_summary(folder / files.SUMMARY), RESULT_FILES)
         if changed:
             path = folder / changed[0]
@@ -70,12 +69,12 @@ def run(scenario: Source, options: RunOptions) -> Result:
             raise InvalidInputError(f"{path}: {what}: changed since the run; rerun with --overwrite")
         with suppress(OutputExistsError, OutputError), files.folder_lock(folder):  # it was killed right after its end
             files.clear_remains(folder, files.CHECKPOINTS)
-        renew_copies(scenario, folder)
+        renew_copies(model.scenario, folder)
         result = read_result(folder)
         options.listener.on_remark(f"already computed; rerun with --overwrite: {folder}")
         return result
     return simulate_into(
-        scenario,
+        model,
         folder,
         overwrite=overwrite,
         resume=resume,

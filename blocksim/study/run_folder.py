@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario, load_scenario, load_stored, spelling
+from blocksim.scenario import Model, Scenario, spelling
 from blocksim.simulation import files, instruments, results, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
 from blocksim.study.rows import FINISHED, TABLE
@@ -57,7 +57,7 @@ def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Pat
     if place.suffix.lower() == ".csv":
         message = f"{place}: this is a table, not a run; a run folder, results/NAME or a scenario file is needed"
         raise InvalidInputError(message)
-    folder = files.default_folder(load_scenario(place))
+    folder = files.default_folder(Model(place))
     if not (folder / files.DONE).is_file():
         message = f"{place}: no finished run of this scenario without changes; first: blocksim run {place}"
         newest = files.newest_run(folder.parent) if folder.parent.is_dir() else None
@@ -95,11 +95,16 @@ class StoredRun(NamedTuple):
     """What a run has left so far."""
 
     folder: Path
-    scenario: Scenario
+    model: Model
     frames: trajectory.Frames
     events: tuple[results.EventRecord, ...]  # that have happened; none where run.json is missing or damaged
     remark: str  # for whoever examines the frames; empty for a finished run that was meant for certain
     probes: Callable[[], Mapping[str, instruments.ProbeSeries]]  # samples by name
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was run."""
+        return self.model.scenario
 
 
 def read_run(place: Path | str) -> StoredRun:
@@ -108,8 +113,8 @@ def read_run(place: Path | str) -> StoredRun:
     Raises InputMissingError, ScenarioError, or InvalidInputError for frames that cannot be read.
     """
     folder = find_run(place, needed=(files.SCENARIO, files.FRAMES))
-    scenario = load_stored(folder / files.SCENARIO)
-    frames = read_frames(folder / files.FRAMES, scenario)
+    model = Model.stored(folder / files.SCENARIO)
+    frames = read_frames(folder / files.FRAMES, model)
     events: tuple[results.EventRecord, ...] = ()
     state = "this run was killed or is still running"
     if (folder / files.SUMMARY).is_file():
@@ -119,8 +124,8 @@ def read_run(place: Path | str) -> StoredRun:
             events, was = summary.events, "was" if summary.status == "interrupted" else "has"
             state = f"this run {was} {summary.status} ({summary.reason})" if summary.status != FINISHED else ""
     end = f"{folder}: {state}; its {len(frames)} frames end at {float(frames.time[-1]):.4g} s"
-    probes = partial(read_probes, folder / files.FRAMES, scenario)
-    return StoredRun(folder, scenario, frames, events, end if state else choice(Path(place), folder), probes)
+    probes = partial(read_probes, folder / files.FRAMES, model)
+    return StoredRun(folder, model, frames, events, end if state else choice(Path(place), folder), probes)
 
 
 def choice(place: Path, folder: Path) -> str:

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.options import takes
-from blocksim.scenario import Document, Source, document_of, place_bodies
+from blocksim.scenario import Document, Model, Source, document_of
 from blocksim.statics.blockwork import MOST_BLOCKS, Blockwork
 from blocksim.statics.joint_forces import BlockMotion, JointForce, block_motions, joint_forces
 from blocksim.statics.programme import FEW, Equilibrium, Programme
@@ -146,9 +146,9 @@ class StaticAnswer(RangeAnswer, frozen=True):
             raise InvalidInputError(f"{self.folder}: nothing changes within its range; nothing to draw")
         one = self.limits[0]
         setting = limit_plan.setting(self.key, one.value, self.unit, is_whole=self.is_whole)
-        scenario = Document.read(self.folder / self.files.plan, is_stored=True).with_values(setting).build()
+        model = Model(Document.read(self.folder / self.files.plan, is_stored=True).with_values(setting))
         heads = f"an equilibrium is possible at {self.key} = {with_unit(one.value, self.unit)}", "a mechanism beyond it"
-        thrust.draw_thrust(scenario, one.joints, one.mechanism, heads, path, title, paper)
+        thrust.draw_thrust(model, one.joints, one.mechanism, heads, path, title, paper)
 
 
 @takes(limit_plan.LimitOptions)
@@ -166,7 +166,7 @@ def bound_of(plan: LimitPlan) -> StaticLimit | None:
 
     Nor is it asked of so many blocks that it would take as long as runs.
     """
-    if len(place_bodies(plan.scenario_at(plan.span.high))) > MOST_BLOCKS:
+    if len(plan.model_at(plan.span.high).bodies) > MOST_BLOCKS:
         return None
     with suppress(InvalidInputError):  # such as a load that changes with time, or a block that rests on nothing
         limits = search_statics(plan).limits
@@ -181,7 +181,7 @@ def find_static(plan: LimitPlan, options: limit_plan.LimitOptions) -> StaticAnsw
         flags = " and ".join(f"--{name}" for name in of_runs)
         raise InvalidInputError(f"statics makes no runs: leave {flags} out")
     found = search_statics(plan)
-    base, kind = plan.scenario_at(plan.span.low), StaticAnswer.files
+    base, kind = plan.model_at(plan.span.low), StaticAnswer.files
     folder = sweep.make_folder(options.out, base, kind, plan.name, overwrite=options.overwrite)
     answer = StaticAnswer.of(plan, folder, found)
     answer.write()
@@ -216,7 +216,7 @@ def _at(plan: LimitPlan, value: Number) -> Iterator[None]:
 
 def _structure_at(plan: LimitPlan, value: Number) -> Blockwork:
     with _at(plan, value):
-        return Blockwork.of(plan.scenario_at(value))
+        return Blockwork.of(plan.model_at(value))
 
 
 def search_statics(plan: LimitPlan) -> StaticSearch:

@@ -15,7 +15,7 @@ from typing import Annotated, Self, TypeVar
 
 from blocksim import errors
 from blocksim.options import Option, Overwrite, silent, takes
-from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
+from blocksim.scenario import Document, Model, Source, document_of
 from blocksim.simulation import files, interruption, provenance, schemes
 from blocksim.study import executors, manifest, plan as plans, rows, sweep_folder
 
@@ -95,11 +95,11 @@ def run_sweep(document: Document, options: SweepOptions) -> manifest.SweepResult
     """Run the cases of a document that has its [sweep] table; see `sweep`."""
     shard = options.shard
     refuse_loss(shard, overwrite=options.overwrite)
-    base = document.build()
-    plan = plans.plan_of(base)
+    model = Model(document)
+    base, plan = model.scenario, plans.plan_of(model)
     cases = plans.cases_of(document, plan)
     tables = plans.table_digests(document, plan.vary)
-    about = [scenario_hash(base), plan.as_table(), *([tables] if tables else []), provenance.code_hash()]
+    about = [model.hash, plan.as_table(), *([tables] if tables else []), provenance.code_hash()]
     name = manifest.short_hash(about)
     folder = Path(options.out) if options.out is not None else files.RESULTS / base.name / f"sweep-{name}"
     rounds, setting = options.ready(folder / sweep_folder.CASES if options.keep_cases else None)
@@ -210,8 +210,8 @@ class SweepRun:
             if self.done.holds(number, self.cases.design[number]):
                 continue
             case = self.cases[number]
-            if case.scenario is not None:
-                yield executors.Task(number, case.name, case.settings, case.scenario)
+            if case.model is not None:
+                yield executors.Task(number, case.name, case.settings, case.model)
                 continue
             self.invalid.append((number, case.name, case.settings, rows.invalid_row(case.problem)))
             if len(self.invalid) >= MOST_INVALID:
@@ -239,8 +239,8 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> manifest.SweepR
     """
     folder = Path(folder)
     document = sweep_folder.read_plan(folder)
-    base = document.build()
-    cases = plans.cases_of(document, plans.plan_of(base))
+    model = Model(document)
+    base, cases = model.scenario, plans.cases_of(document, plans.plan_of(model))
     done = manifest.CaseIndex(folder, len(cases))
     if not done.paths:
         raise errors.InputMissingError(f"{folder}: no case of this sweep has run yet")
@@ -264,11 +264,9 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> manifest.SweepR
 class Runs:
     """The rows of a study: those in its manifest, and what an executor adds to them."""
 
-    def __init__(
-        self, kept: manifest.Manifest, document: Document, run: executors.Run, setting: executors.RunSetting
-    ) -> None:
-        """Take what is known from the manifest; all others are runs of the document with other values."""
-        self.manifest, self.document, self._run, self._setting = kept, document, run, setting
+    def __init__(self, kept: manifest.Manifest, base: Model, run: executors.Run, setting: executors.RunSetting) -> None:
+        """Take what is known from the manifest; all others are runs of the base with other values."""
+        self.manifest, self.base, self._run, self._setting = kept, base, run, setting
         self.known = {entry.values: entry.row for _, entry in manifest.read_entries(kept.path)}
         self.new = 0
 
@@ -292,11 +290,11 @@ class Runs:
 
         def tasks() -> Iterator[executors.Task]:
             for number, key in enumerate(missing.values(), start=len(self.known)):
-                case = plans.SweepCase.of(self.document, wanted[key])
-                if case.scenario is None:
+                case = plans.SweepCase.of(self.base, wanted[key])
+                if case.model is None:
                     keep(wanted[key], "", rows.invalid_row(case.problem))
                 else:
-                    yield executors.Task(number, case.name, wanted[key], case.scenario)
+                    yield executors.Task(number, case.name, wanted[key], case.model)
 
         try:
             with interruption.stop_requests() as is_stopped:
@@ -315,8 +313,8 @@ class Runs:
 
 @contextmanager
 def runs_of(
-    document: Document,
-    base: Scenario,
+    base: Model,
+    first: Model,
     out: Path | str | None,
     kind: sweep_folder.FolderKind,
     name: str,
@@ -325,29 +323,29 @@ def runs_of(
     overwrite: bool = False,
     peaks: bool = False,
 ) -> Iterator[Runs]:
-    """Make the folder of a study, see `make_folder`, and give what runs the document.
+    """Make the folder of a study with its first model, see `make_folder`, and give what runs varied ones of its base.
 
     With `peaks` rows have the largest rotation on the way. Raises OutputExistsError where the folder is not free,
     UnavailableError for an executor that is not there.
     """
     rounds, setting = execution.ready()
-    folder = make_folder(out, base, kind, name, overwrite=overwrite)
-    schemes.compile_kernels(schemes.kernels_of(base))
+    folder = make_folder(out, first, kind, name, overwrite=overwrite)
+    schemes.compile_kernels(schemes.kernels_of(first.scenario))
     what = kind.what.split(" ", 1)[1]
     with closing(manifest.Manifest(folder / manifest.MANIFEST, what)) as kept, rounds() as run:
-        yield Runs(kept, document, run, replace(setting, peaks=peaks))
+        yield Runs(kept, base, run, replace(setting, peaks=peaks))
 
 
 def make_folder(
-    out: Path | str | None, base: Scenario, kind: sweep_folder.FolderKind, name: str, *, overwrite: bool
+    out: Path | str | None, base: Model, kind: sweep_folder.FolderKind, name: str, *, overwrite: bool
 ) -> Path:
     """Make the folder of a study of this name with its scenario: as given, or results/SCENARIO/STUDY-NAME.
 
     Raises OutputExistsError where it is not free, and what is wrong with the scenario's experiment.
     """
     rows.check_experiment(base)
-    folder = Path(out) if out is not None else files.RESULTS / base.name / f"{Path(kind.plan).stem}-{name}"
-    sweep_folder.prepare(folder, base, name, overwrite=overwrite, kind=kind)
+    folder = Path(out) if out is not None else files.RESULTS / base.scenario.name / f"{Path(kind.plan).stem}-{name}"
+    sweep_folder.prepare(folder, base.scenario, name, overwrite=overwrite, kind=kind)
     return folder
 
 

@@ -24,7 +24,7 @@ import numpy as np
 from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.options import silent
-from blocksim.scenario import input_files, scenario_hash
+from blocksim.scenario import Model, input_files, scenario_hash
 from blocksim.scenario.structures.polygons import AS_READ
 from blocksim.simulation import Watcher, checkpoint, files, instruments, observables, provenance, results, simulate
 from blocksim.simulation.trajectory import csv_text
@@ -259,14 +259,14 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
     Raises InputMissingError, or InvalidInputError where table, plan and manifests do not go together.
     """
     document = sweep_folder.read_plan(folder)
-    base = document.build()
+    base = Model(document)
     cases = plan.cases_of(document, plan.plan_of(base))
     columns, lines = _read_table(folder / TABLE)
     numbers = _numbers(folder, cases, len(lines))
     rows = _chosen(len(lines), sample, seed)
-    scenarios = [case.scenario for row in rows if (case := cases[numbers[row]]).scenario is not None]
-    ends = iter(rows_of(scenarios, os.cpu_count() or 1))
-    ranges = Ranges.of(base)
+    models = [case.model for row in rows if (case := cases[numbers[row]]).model is not None]
+    ends = iter(rows_of(models, os.cpu_count() or 1))
+    ranges = Ranges.of(base.scenario)
     origins, is_same_code = _origins(folder, sweep_folder.SWEEP)
     entries = (entry for path in sorted(folder.glob(manifest.PATTERN)) for _, entry in manifest.read_entries(path))
     names = {entry.number: entry.case for entry in entries}  # the last one of each
@@ -279,7 +279,7 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
     ]
     for row in rows:
         case, stored = cases[numbers[row]], dict(zip(columns, lines[row], strict=True))
-        end = invalid_row(case.problem) if case.scenario is None else next(ends)
+        end = invalid_row(case.problem) if case.model is None else next(ends)
         now = _cells(columns, case, end, ranges)
         found += [
             CellDifference(row + 1, stored[CASE], name, stored[name], now[name])
@@ -311,7 +311,7 @@ def verify_study(folder: Path, study: answer.Study, sample: int = SAMPLE, seed: 
     origins, is_same_code = _origins(folder, kind)
     chosen = _chosen(len(replay.runs), sample, seed)
     peaks = any(observables.PEAK in replay.runs[number][1].row for number in chosen)
-    rows = rows_of([replay.runs[number][0].scenario for number in chosen], os.cpu_count() or 1, peaks=peaks)
+    rows = rows_of([replay.runs[number][0].model for number in chosen], os.cpu_count() or 1, peaks=peaks)
     for number, row in zip(chosen, rows, strict=True):
         task, entry = replay.runs[number]
         then: Row = {CASE: entry.case, **entry.row}

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import AT_REST, REACHED
-from blocksim.scenario import Document, place_bodies
-from blocksim.simulation.schemes import build_scene
+from blocksim.scenario import Document, Model
+from blocksim.simulation.schemes import build
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, at_least, farthest, relative
 from blocksim.verification.scene import (
@@ -312,7 +312,7 @@ def ledgers(setting: Setting) -> Iterator[Row]:
         own = document.build()
         if setting.has_springs and not own.time.has_springs:
             continue
-        is_crowd = len(place_bodies(own)) > CROWD
+        is_crowd = len(Model(own).bodies) > CROWD
         name, tolerance = path.stem, LEDGER_TOLERANCE
         changes: dict[str, object] = {"contact.model": setting.model, "contact.law": setting.law}
         if not setting.has_springs:
@@ -335,7 +335,7 @@ def ledgers(setting: Setting) -> Iterator[Row]:
             stiffness_scale = changes.get("contact.stiffness_scale", own.contact.stiffness_scale)
             changes["contact.stiffness_scale"] = STIFFER * float(str(stiffness_scale))
         scenario = document.with_values(changes).build()
-        run, worst = Simulation(build_scene(scenario)), 0.0  # the largest residual over the energy in play
+        run, worst = Simulation(build(Model(scenario))), 0.0  # the largest residual over the energy in play
         for k in range(1, round(scenario.time.end / scenario.output.every) + 1):
             worst = max(worst, run.to_time(k * scenario.output.every).residual())
             if run.status != REACHED:

@@ -228,7 +228,7 @@ def write_paper(folder: Path, scenarios: Path, settings: Mapping[str, object] | 
         raise OutputError(f"{folder}: cannot be created: {error.strerror}") from None
     names = ("figure3.png", "figure4.png", "equation10.png", "equation13.png", "README.md")
     final, strip, equation10, equation13, index = written = [folder / name for name in names]
-    support = run_data.support_of(first.scenario)
+    support = run_data.support_of(first.model)
     options = scene.PictureOptions(f"Figure 3: {first.name}", centres.summaries(), support, count=PANELS, paper=PAPER)
     draw_final(first.frames, final, options)
     draw_strip(first.frames, strip, replace(options, title=f"Figure 4: {first.name}"))

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import REACHED, World
-from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, scenario_from_mapping
 from blocksim.scenario.models import timeline
 from blocksim.simulation import balance, schemes
-from blocksim.simulation.schemes import AnyScene, build_scene, measure_row, scheme_of
+from blocksim.simulation.schemes import AnyScene, build, measure_row, scheme_of
 from blocksim.verification import closed_forms as forms
 from blocksim.world.build import arrays_of
 
@@ -129,7 +129,7 @@ class CaseScene:
 
     def start(self, change: Callable[[World], None] | None = None) -> Simulation:
         """Start it; `change` edits the world before the first contacts are found."""
-        scene = build_scene(self.scenario())
+        scene = build(Model(self.scenario()))
         if change is not None:
             change(scene.world)
         return Simulation(scene)
@@ -202,7 +202,7 @@ class Thrower:
         """Build the world for impacts at `speed` (m/s), on which its step may depend; `values` go to CaseScene."""
         body = {"y": 1.0, "velocity": [0.0, -speed]}
         self.speed = speed
-        self.scene = build_scene(setting.scene([body], restitution=restitution, gravity=0.0, **values).scenario())
+        self.scene = build(Model(setting.scene([body], restitution=restitution, gravity=0.0, **values).scenario()))
         self.world = self.scene.world
         self.scheme = scheme_of(self.scene)
         self.fresh = [array.copy() for array in arrays_of(self.scene)]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.soil import arrays, stress
-from blocksim.scenario import geometry, scenario_from_mapping
-from blocksim.simulation.schemes import build_scene, ledger_names
+from blocksim.scenario import Model, geometry
+from blocksim.simulation.schemes import build, ledger_names
 from blocksim.verification.case import Case, Row, Setting, at_least, count, relative
 from blocksim.verification.scene import Simulation
 from blocksim.world.systems.soils import connected_span
@@ -96,7 +96,7 @@ class SoilScene(Simulation):
             "gravity": gravity,
             "time": {"end": 10.0, "stop_at_rest": False},
         }
-        super().__init__(build_scene(scenario_from_mapping(data)))
+        super().__init__(build(Model(data)))
 
     @property
     def soils(self) -> Any:

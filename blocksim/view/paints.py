@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Scenario, place_bodies
+from blocksim.scenario import Model
 from blocksim.simulation.trajectory import Frames
 from blocksim.view import run_data, style
 
@@ -67,9 +67,9 @@ def by_block(frames: Frames) -> Paint:
     return Paint(lambda _: fills)
 
 
-def by_material(_: object, scenario: Scenario) -> Paint:
+def by_material(_: object, model: Model) -> Paint:
     """Return a colour for each material, in the order of the blocks; fixed bodies keep the ground's."""
-    bodies = place_bodies(scenario)
+    bodies = model.bodies
     materials = list(dict.fromkeys(body.material for body in bodies))
     colours = {name: style.block_colour(index) for index, name in enumerate(materials)}
     fills = [colours[body.material] for body in bodies]
@@ -128,8 +128,8 @@ def by_displacement(frames: Frames, support: run_data.Support, most: float) -> P
     return _scaled(factor * 1e3 * displacements(frames, support), scale)
 
 
-# Each takes the frames and the scenario; another way to colour is one function and one line here.
-PAINTS: dict[str, Callable[[Any, Scenario], Paint]] = {
+# Each takes the frames and the model; another way to colour is one function and one line here.
+PAINTS: dict[str, Callable[[Any, Model], Paint]] = {
     "block": lambda frames, _: by_block(frames),
     "material": by_material,
     "speed": lambda frames, _: by_speed(frames),
@@ -142,7 +142,7 @@ SHADES = ("displacement", "speed", "plastic", "pressure")
 COLOURS = tuple(dict.fromkeys((*PAINTS, *SHADES)))
 
 
-def paint_of(name: str, frames: Frames, scenario: Scenario) -> Paint:
+def paint_of(name: str, frames: Frames, model: Model) -> Paint:
     """Return the colours of a run by their meaning. Raises InvalidInputError for a meaning that this run does not have.
 
     Elements of other systems have their first shade, unless the meaning is one of theirs: then blocks keep their own
@@ -154,7 +154,7 @@ def paint_of(name: str, frames: Frames, scenario: Scenario) -> Paint:
         raise InvalidInputError(f"unknown colour {name!r} in this run; choose {', '.join(known)}")
     if name in shades:
         return shade_elements(by_block(frames), frames, name)
-    paint = PAINTS[name](frames, scenario)
+    paint = PAINTS[name](frames, model)
     return shade_elements(paint, frames, shades[0]) if shades and paint.scale is None else paint
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import PlacedSegment, Scenario, events, geometry, open_faces, place_bodies, placement
+from blocksim.scenario import Model, PlacedSegment, events, geometry, open_faces, placement
 from blocksim.scenario.models.actuators import Actuator
 from blocksim.scenario.models.loads import AnyLoad, Stretch, joined, stretches_of
-from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
+from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction
 from blocksim.simulation.results import EventRecord
 from blocksim.simulation.trajectory import Frames
 from blocksim.world.systems.blocks import boxes_around
@@ -192,14 +192,14 @@ def is_fixed(frames: Frames, support: Support) -> Flags:
 
 
 def support_of(
-    scenario: Scenario, happened: Sequence[EventRecord] = (), probes: "Mapping[str, ProbeSeries] | None" = None
+    model: Model, happened: Sequence[EventRecord] = (), probes: "Mapping[str, ProbeSeries] | None" = None
 ) -> Support:
     """Return the support of a scenario's runs, or of one in which these events have happened.
 
     Of events that wait for rest only a run knows the time: until then it is infinite. Forces of actuators are those of
     its `probes`.
     """
-    placed = place_bodies(scenario)
+    scenario, placed = model.scenario, model.bodies
     times = [np.inf if event.at is None else event.at for event in scenario.events]
     for one in happened:
         times[one.event] = one.time_s
@@ -211,7 +211,7 @@ def support_of(
             stretches_of(one.load, scenario.ground.tilt),
             min((at for event, at in timeline if one.load.name in event.unload), default=math.inf),
         )
-        for one in open_faces.acting_loads(scenario, numbers)
+        for one in model.acting_loads
     )
     for name, jack in zip(events.actuator_names(scenario), scenario.actuators, strict=True):
         if (series := (probes or {}).get(name)) is not None and len(series):
@@ -228,7 +228,7 @@ def support_of(
         ),
         tilt=scenario.ground.tilt,
         direction=motion_direction(scenario),
-        motion=None if scenario.motion is None else motion_pieces(scenario),
+        motion=None if scenario.motion is None else model.motion,
         loads=loads,
         weight=scenario.gravity * sum(body.mass for body in placed if not body.fixed or body.freed),
     )

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blocksim.scenario import Scenario, place_bodies, placement
+from blocksim.scenario import Model, placement
 from blocksim.simulation.trajectory import SUPPORT, Frames, forces_on_a
 from blocksim.statics.joint_forces import BlockMotion, JointForce
 from blocksim.view import arrows, mechanism, paints, run_data, scene, style
@@ -42,7 +42,7 @@ class _Panels(NamedTuple):
 
 
 def draw_thrust(
-    scenario: Scenario,
+    model: Model,
     joints: Sequence[JointForce],
     motions: Sequence[BlockMotion],
     heads: tuple[str, str],
@@ -55,7 +55,7 @@ def draw_thrust(
     `heads` stand above both panels. The same input gives the same bytes. Raises InvalidInputError for an unknown
     picture format or too small a page, OutputError.
     """
-    frames, support = _frames(scenario, motions), run_data.support_of(scenario)
+    frames, support = _frames(model, motions), run_data.support_of(model)
     _draw(_Panels(frames, support, [*enumerate(heads)], joints, f"{NOTES} {SEVERAL}"), path, title, paper)
 
 
@@ -143,9 +143,9 @@ def _draw(panels: _Panels, path: Path, title: str | None, paper: style.Paper) ->
         style.save_figure(figure, path)
 
 
-def _frames(scenario: Scenario, motions: Sequence[BlockMotion]) -> Frames:
+def _frames(model: Model, motions: Sequence[BlockMotion]) -> Frames:
     """Return the blocks as they are placed, and as they are when they have moved a little in the mechanism."""
-    placed = place_bodies(scenario)
+    placed = model.bodies
     ways = {one.block: (one.x_m, one.y_m, one.turn_rad) for one in motions}
     moved = np.array([ways.get(body.name, (0.0, 0.0, 0.0)) for body in placed])
     usual = float(np.median([body.least_width for body in placed]))

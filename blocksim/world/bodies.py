@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from blocksim.kernels.common import arrays, tolerances
 from blocksim.kernels.explicit.models.particles import PER_PARTICLE
-from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments, placement
+from blocksim.scenario import Model, PlacedBody, PlacedSegment, Scenario, placement
 from blocksim.world.excitation import Drives, LoadArrays, drive_records, load_arrays
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
 
@@ -220,7 +220,7 @@ def division(side: float, spacing: float) -> int:
 class Layout(NamedTuple):
     """Placement of a scenario before arrays are built: it determines their sizes."""
 
-    scenario: Scenario
+    model: Model
     placed: tuple[PlacedBody, ...]
     segments: tuple[PlacedSegment, ...]
     classes: tuple[ContactClass, ...]
@@ -229,6 +229,11 @@ class Layout(NamedTuple):
     applied: LoadArrays
     slabs: arrays.Records  # (s,) BODY: the pieces of ground and walls
     shapes: Shapes
+
+    @property
+    def scenario(self) -> Scenario:
+        """What it is the layout of."""
+        return self.model.scenario
 
     @property
     def shape(self) -> tuple[object, ...]:
@@ -240,14 +245,14 @@ class Layout(NamedTuple):
         return model, len(self.placed), len(self.segments), len(self.classes), moved, loads, shapes
 
 
-def layout_of(scenario: Scenario) -> Layout:
+def layout_of(model: Model) -> Layout:
     """Return the layout of a scenario."""
-    placed, segments = place_bodies(scenario), place_segments(scenario)
+    scenario, placed, segments = model.scenario, model.bodies, model.segments
     classes = contact_classes(scenario, placed)
     slabs = _slab_records(scenario, placed, segments, classes)
     shapes = shapes_of(placed, zip(slabs["half_x"].tolist(), slabs["half_y"].tolist(), strict=True))
-    prescribed = drive_records(scenario, placed), load_arrays(scenario, placed)
-    return Layout(scenario, placed, segments, classes, interactions_of(scenario, classes), *prescribed, slabs, shapes)
+    prescribed = drive_records(model), load_arrays(model)
+    return Layout(model, placed, segments, classes, interactions_of(scenario, classes), *prescribed, slabs, shapes)
 
 
 def _slab_records(

@@ -20,7 +20,7 @@ from blocksim.kernels.common import arrays, tolerances
 from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
 from blocksim.kernels.explicit import models
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
-from blocksim.scenario import PlacedBody, Scenario, laws, motion, placement
+from blocksim.scenario import Model, laws, motion, placement
 from blocksim.world import excitation, interactions, memory
 from blocksim.world.bodies import Layout, body_records, layout_of, motion_records, place_particles, slots_of_a_pair
 from blocksim.world.step import MOST_STEPS, Bounds, Stride, bounds_of, choose_stride
@@ -76,18 +76,10 @@ class Construction:
     assemble: Callable[[Parts, Sequence[Stride]], Any]
 
 
-class InitialScene(NamedTuple):
-    """One scene at time zero, and its blocks as they were placed."""
-
-    placed: tuple[PlacedBody, ...]
-    scene: Any  # of the scheme's type
-
-
 class SceneStack(NamedTuple):
     """Scenes that were built together."""
 
-    numbers: list[int]  # which of the scenarios they are of
-    placed: list[tuple[PlacedBody, ...]]
+    numbers: list[int]  # which of the models they are of
     scenes: Any  # of the scheme's type
 
 
@@ -101,26 +93,23 @@ class Refusal(NamedTuple):
 Stacks = Iterator[SceneStack | Refusal]
 
 
-def build_one(scenario: Scenario, construction: Construction) -> InitialScene:
+def build_one(model: Model, construction: Construction) -> Any:
     """Build the scene of one scenario.
 
     Raises SceneTooLargeError when there is not enough memory for it, StepError when the scenario asks for an
     inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
-    stack = only_stack(build_stacks([scenario], construction))
-    return InitialScene(stack.placed[0], member(stack.scenes, 0))
+    return member(only_stack(build_stacks([model], construction)).scenes, 0)
 
 
-def build_stacks(
-    scenarios: Sequence[Scenario], construction: Construction, numbers: Sequence[int] | None = None
-) -> Stacks:
+def build_stacks(models: Sequence[Model], construction: Construction, numbers: Sequence[int] | None = None) -> Stacks:
     """Build scenarios of one scheme; those of one shape come in as few stacks as memory allows.
 
     A scenario whose step, skin or size is refused does not stop the others. Stacks name them by `numbers`, by their
     places where none are given.
     """
-    names = range(len(scenarios)) if numbers is None else numbers
-    layouts = [layout_of(scenario) for scenario in scenarios]
+    names = range(len(models)) if numbers is None else numbers
+    layouts = [layout_of(model) for model in models]
     for places in group_equal([layout.shape for layout in layouts]):
         good, strides, refusals = list[int](), list[Stride](), list[Refusal]()
         with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused
@@ -152,8 +141,7 @@ def _stacks(numbers: list[int], parts: Parts, strides: list[Stride], constructio
             yield from (Refusal(number, error) for number in names)
         else:
             chosen = parts.chosen(places)
-            placed = [layout.placed for layout in chosen.layouts]
-            yield SceneStack(names, placed, construction.assemble(chosen, [strides[k] for k in places]))
+            yield SceneStack(names, construction.assemble(chosen, [strides[k] for k in places]))
 
 
 def _divided(layouts: Sequence[Layout], bodies: arrays.Records) -> Iterator[tuple[list[int], Parts]]:
@@ -260,9 +248,9 @@ def with_parts(scene: Any, parts: list[Any]) -> Any:
     return type(scene)(*parts) if hasattr(scene, "_fields") else tuple(parts)
 
 
-def build_world(scenario: Scenario) -> arrays.World:
+def build_world(model: Model) -> arrays.World:
     """Return the world at time zero, pair lists still empty. Raises as `build_one`."""
-    world: arrays.World = build_one(scenario, EXPLICIT).scene
+    world: arrays.World = build_one(model, EXPLICIT)
     return world
 
 
@@ -327,7 +315,7 @@ def assemble_world(
     )
     world.large[...] = large
     for layout, records, control in zip(layouts, world.loads, controls[:, 0], strict=True):
-        springs = excitation.springs_of(layout.scenario, layout.placed, float(control["step"]))
+        springs = excitation.springs_of(layout.model, float(control["step"]))
         for record, (stiffness, damping) in zip(records[records.size - len(springs) :], springs, strict=True):
             record.stiffness, record.damping = stiffness, damping
     world.clock["motion_piece"][:, 0] = layouts[0].drives.paths
@@ -397,7 +385,7 @@ def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
         few = round(min(CHEAP_CHECKS, hold / FEWEST_CHECKS / step))  # of a quotient that may be infinite
         every = max(1, few, round(min(MOST_STEPS, hold / CHECKS / step)))
         if not time.has_springs:  # those look at every overlap in every step
-            driven = max(excitation.drive_bounds(scenario)[0], excitation.greatest_head_speed(scenario)) * step
+            driven = max(excitation.drive_bounds(layout.model)[0], excitation.greatest_head_speed(scenario)) * step
             passing = HALFWAY * placement.smallest_width(layout.placed)
             every = max(1, min(every, int(passing / driven))) if driven > 0.0 and layout.placed else every
         rest_checks = max(1, math.ceil(min(time.rest_hold / (every * step), MOST_STEPS))) if time.stop_at_rest else 0
@@ -429,11 +417,11 @@ def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
     return controls
 
 
-def couple(scenario: Scenario, world: Any, others: tuple[SystemInScene, ...]) -> Coupled:
+def couple(model: Model, world: Any, others: tuple[SystemInScene, ...]) -> Coupled:
     """Return a world with further systems at time zero. Raises InvalidInputError for a pair that is not modelled."""
     systems = tuple(present.system for present in others)
     acts = tuple(Act(*one) for one in acts_of(systems))
-    built = tuple(system.build(scenario) for system in systems if system.build is not None)
+    built = tuple(system.build(model) for system in systems if system.build is not None)
     stages = tuple(system.stages() for system in systems if system.stages is not None)
     energies = tuple(tuple(f"{system.name}_{name}" for name in system.energies) for system in systems)
     plan(built, Plan(stages, acts, energies))

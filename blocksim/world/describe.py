@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from blocksim.kernels.common.arrays import World
-from blocksim.scenario import GROUND, PlacedBody, Scenario, geometry, laws, motion
+from blocksim.scenario import GROUND, Model, PlacedBody, geometry, laws, motion
 from blocksim.world import build, interactions, memory, nonsmooth, rigid_step, systems
 from blocksim.world.bodies import Layout, division, layout_of
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
@@ -101,17 +101,17 @@ class Description:
     warnings: tuple[str, ...]  # of results of these systems that are known to be off
 
 
-def describe(scenario: Scenario) -> Description:
+def describe(model: Model) -> Description:
     """Build the scene and describe it. Raises what building it raises."""
-    layout, others = layout_of(scenario), systems.others_of(scenario)
+    scenario, layout, others = model.scenario, layout_of(model), systems.others_of(model)
     count, has_rigid = len(layout.placed), scenario.time.has_rigid_contacts
     if has_rigid:
-        scene = nonsmooth.build_nonsmooth(scenario)
+        scene = nonsmooth.build_nonsmooth(model)
         world, size = scene.world, memory.rigid_size(count, scene.contacts.constraints.size)
     else:
-        world = build.build_world(scenario)
+        world = build.build_world(model)
         if scenario.systems:
-            build.couple(scenario, world, others)  # refuses pairs that are not modelled
+            build.couple(model, world, others)  # refuses pairs that are not modelled
         slots, has_particles = world.candidates.shape[1], world.particles is not None
         size = memory.scene_size(count, world.pairs.size, slots, has_particles=has_particles)
     step = float(world.controls[0].step)
@@ -127,8 +127,8 @@ def describe(scenario: Scenario) -> Description:
     touching = 0 if world.particles is None else particles // PARTICLES_OF_A_CONTACT
     contacts = max(memory.CONTACTS_OF_A_BODY * count, touching) if scenario.output.contacts else 0
     more = sum(one.count * one.system.cost.memory for one in others)
-    of_systems = sum(one.count * one.system.cost.seconds * one.system.dearer(scenario) for one in others)
-    limits, of_others = None, systems.largest_step(scenario)
+    of_systems = sum(one.count * one.system.cost.seconds * one.system.dearer(model) for one in others)
+    limits, of_others = None, systems.largest_step(model)
     if scenario.time.has_springs and of_others < math.inf:
         of_blocks = step_of_contacts(layout, bounds, speeds)
         limits = StepLimits(of_blocks, of_others, scenario.contact.stiffness_scale * (of_blocks / of_others) ** 2)
@@ -152,7 +152,7 @@ def describe(scenario: Scenario) -> Description:
         )
     support = None
     if scenario.motion is not None:
-        peaks = motion.motion_peaks(motion.motion_pieces(scenario), scenario.time.end)
+        peaks = motion.motion_peaks(model.motion, scenario.time.end)
         values = (peaks.acceleration.value, peaks.displacement.value, peaks.velocity.value)
         support = MotionDescription(*values, abs(peaks.final_velocity))
     return Description(
@@ -171,7 +171,7 @@ def describe(scenario: Scenario) -> Description:
         rigid=rigid,
         systems={one.system.name: one.count for one in others},
         limits=limits,
-        warnings=tuple(systems.warnings_of(scenario)),
+        warnings=tuple(systems.warnings_of(model)),
     )
 
 

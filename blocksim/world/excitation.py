@@ -10,8 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.kernels.common import arrays
-from blocksim.scenario import PlacedBody, Scenario, motion, open_faces, place_bodies
+from blocksim.scenario import PlacedBody, Scenario, motion, open_faces
+from blocksim.scenario.model import Model, derived
 from blocksim.scenario.models import actuators, loads
+from blocksim.scenario.placement import GEOMETRY
 
 COEFFICIENTS = ("c0", "c1", "c2", "c3")
 STANDSTILL = arrays.zeros(1, arrays.MOTION_PIECE)
@@ -26,11 +28,11 @@ class LoadArrays(NamedTuple):
     end: float  # s: from then on none changes with time
 
 
-def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
+@derived(*GEOMETRY, "loads", "actuators", "gravity")
+def load_arrays(model: Model) -> LoadArrays:
     """Return the loads of a scenario in its order, then its actuators, whose stiffness follows from the step."""
-    acts = bool(scenario.loads or scenario.actuators)
-    numbers = {body.name: number for number, body in enumerate(placed)} if acts else {}
-    acting = [*open_faces.acting_loads(scenario, numbers)]
+    scenario, placed, acting = model.scenario, model.bodies, model.acting_loads
+    numbers = {body.name: number for number, body in enumerate(placed)} if scenario.actuators else {}
     records = arrays.zeros(len(acting) + len(scenario.actuators), arrays.LOAD)
     rows: list[loads.Stretch] = []
     pushes, end = {open_faces.ALL: 0.0}, 0.0  # by body
@@ -117,31 +119,33 @@ STIFF_ON_SPRINGS = 1.0 / 30.0
 """The same where contacts are springs: a third of the fastest of those, at the usual step."""
 
 
-def compliances(scenario: Scenario, placed: Sequence[PlacedBody]) -> list[float]:
+def compliances(model: Model) -> list[float]:
     """Return what a force at the point of each actuator accelerates it by, at most (1/kg)."""
-    bodies = {body.name: body for body in placed} if scenario.actuators else {}
-    held = [(bodies[one.body], math.hypot(*one.point)) for one in scenario.actuators]
+    jacks = model.scenario.actuators
+    bodies = {body.name: body for body in model.bodies} if jacks else {}
+    held = [(bodies[one.body], math.hypot(*one.point)) for one in jacks]
     return [1.0 / body.mass + arm**2 / body.inertia for body, arm in held]
 
 
-def springs_of(scenario: Scenario, placed: Sequence[PlacedBody], step: float) -> list[tuple[float, float]]:
+def springs_of(model: Model, step: float) -> list[tuple[float, float]]:
     """Return stiffness (N/m) and damping (N s/m) of all actuators of a run with steps of this length (s).
 
     Where no stiffness is given the body alone would swing as fast on it as a substep resolves well. The dashpot damps
     that critically.
     """
+    scenario = model.scenario
     share = STIFF_ON_SPRINGS if scenario.time.has_springs else STIFF
     frequency = share * scenario.time.parts / step
     springs = []
-    for one, compliance in zip(scenario.actuators, compliances(scenario, placed), strict=True):
+    for one, compliance in zip(scenario.actuators, compliances(model), strict=True):
         stiffness = frequency**2 / compliance if one.stiffness is None else one.stiffness
         springs.append((stiffness, 2.0 * math.sqrt(stiffness / compliance)))
     return springs
 
 
-def greatest_frequency(scenario: Scenario, placed: Sequence[PlacedBody]) -> float:
+def greatest_frequency(model: Model) -> float:
     """Return the greatest angular frequency (1/s) of bodies on actuators whose stiffness is given; zero without."""
-    pairs = zip(scenario.actuators, compliances(scenario, placed), strict=True)
+    pairs = zip(model.scenario.actuators, compliances(model), strict=True)
     return max((math.sqrt(one.stiffness * compliance) for one, compliance in pairs if one.stiffness), default=0.0)
 
 
@@ -166,11 +170,12 @@ class Drives(NamedTuple):
     paths: int  # how many pieces the former have
 
 
-def drive_records(scenario: Scenario, placed: Sequence[PlacedBody]) -> Drives:
+@derived(*GEOMETRY, "motion", "time")
+def drive_records(model: Model) -> Drives:
     """Return all that moves as prescribed in a scenario."""
-    drives, support = motion.drives_of(scenario), STANDSTILL
-    if scenario.motion is not None:  # where it ends before the run, its last piece is constant
-        support = _piece_records(motion.motion_pieces(scenario))
+    drives, placed, support = model.drives, model.bodies, STANDSTILL
+    if model.scenario.motion is not None:  # where it ends before the run, its last piece is constant
+        support = _piece_records(model.motion)
         support = support if support.size else STANDSTILL
     driven, pieces, count = arrays.zeros(len(drives), arrays.MOVED), [], 0
     for record, drive in zip(driven, drives, strict=True):
@@ -199,17 +204,15 @@ def _piece_records(pieces: motion.MotionPieces) -> arrays.Records:
     return records
 
 
-def drive_bounds(scenario: Scenario) -> tuple[float, float]:
+def drive_bounds(model: Model) -> tuple[float, float]:
     """Return the greatest speed (m/s) of any point of a driven body, and how far (m) these may lift what lies on them.
 
     They lift it as far as they go up along their path; one that turns also by twice its distance from the point. Both
     are zero where no body is driven.
     """
     speed = rise = 0.0
-    drives = motion.drives_of(scenario)
-    placed = place_bodies(scenario) if drives else ()
-    for drive in drives:
-        body = placed[drive.body]
+    for drive in model.drives:
+        body = model.bodies[drive.body]
         reach = math.dist((body.x, body.y), drive.about) + body.radius
         speed = max(speed, motion.greatest_rate(drive.shift) + reach * motion.greatest_rate(drive.turn))
         c0, c1, c2, c3 = drive.shift.coefficients.T

@@ -8,7 +8,7 @@ import numpy as np
 from blocksim.kernels.common.arrays import CACHE_LINE, Records, World, zeros
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth import arrays, packs
-from blocksim.scenario import Scenario
+from blocksim.scenario import Model, Scenario
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.world import build, memory, rigid_step, sag, step
 from blocksim.world.bodies import Layout
@@ -56,9 +56,9 @@ def has_sequential_impacts(scenario: Scenario) -> bool:
     return scenario.contact.impacts == "sequential"
 
 
-def build_nonsmooth(scenario: Scenario) -> arrays.Nonsmooth:
+def build_nonsmooth(model: Model) -> arrays.Nonsmooth:
     """Return a world at time zero with all that stepping it without springs needs. Raises as `build_one`."""
-    scene: arrays.Nonsmooth = build.build_one(scenario, NONSMOOTH).scene
+    scene: arrays.Nonsmooth = build.build_one(model, NONSMOOTH)
     return scene
 
 

@@ -254,7 +254,7 @@ def reason_of_step(layout: Layout, bounds: Bounds, speeds: Speeds) -> Reason:
     if period > 0.0:
         why = "a twentieth of {:.3g} s, the shortest period of a motion"
         reasons.append(Reason(PERIOD_SHARE * period, why, (period,)))
-    frequency = excitation.greatest_frequency(scenario, layout.placed)
+    frequency = excitation.greatest_frequency(layout.model)
     if frequency > 0.0:
         why = "the stiffest actuator swings with its body alone at {:.3g} Hz"
         reasons.append(Reason(excitation.STIFF * scenario.time.parts / frequency, why, (frequency / (2.0 * math.pi),)))
@@ -304,6 +304,6 @@ def longest_step(layout: Layout, bounds: Bounds, speeds: Speeds) -> float:
     time = layout.scenario.time
     rate = max(speeds.given + speeds.support, speeds.greatest / time.parts)
     longest = SHARE * bounds.smallest / rate if rate > 0.0 else time.end
-    if (frequency := excitation.greatest_frequency(layout.scenario, layout.placed)) > 0.0:
+    if (frequency := excitation.greatest_frequency(layout.model)) > 0.0:
         longest = min(longest, STIFFEST * time.parts / frequency)
     return min(longest, PERIOD_SHARE * motion.shortest_cycle(layout.scenario))

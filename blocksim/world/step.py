@@ -183,7 +183,7 @@ class Speeds(NamedTuple):
 def speeds_of(layout: Layout, bounds: Bounds) -> Speeds:
     """Return the bounds of the speeds of a scene."""
     scenario, tilt = layout.scenario, excitation.steepest_tilt(layout.scenario)
-    driven, rise = excitation.drive_bounds(scenario)
+    driven, rise = excitation.drive_bounds(layout.model)
     given = max(bounds.speed, driven, excitation.greatest_head_speed(scenario))
     for one in [event.velocity for event in scenario.events if event.velocity is not None]:
         size = max((math.hypot(block.size_x, block.size_y) for block in scenario.blocks.values()), default=0.0)
@@ -201,7 +201,7 @@ def speeds_of(layout: Layout, bounds: Bounds) -> Speeds:
     slide = max(0.0, slope + push) * scenario.time.end
     if push > 0.0 and scenario.time.has_springs:  # rigid contacts sink in under loads, with the square of the step
         slide = min(slide, max(0.0, slope) * scenario.time.end + math.sqrt(2.0 * push * _extent_of(layout)))
-    support = 0.0 if scenario.motion is None else motion.greatest_rate(motion.motion_pieces(scenario))
+    support = 0.0 if scenario.motion is None else motion.greatest_rate(layout.model.motion)
     impact = math.hypot(given, fall)
     return Speeds(given, fall, impact, impact + slide, support)
 
@@ -326,8 +326,8 @@ def choose_stride(layout: Layout, bounds: Bounds) -> Stride:
         speed = speeds.greatest + speeds.support
         share = TRAVEL_SHARE_OF_PARTICLES if has_particles else TRAVEL_SHARE
         of_travel = share * bounds.smallest / speed if speed > 0.0 else math.inf
-        limit = min(step_of_contacts(layout, bounds, speeds), of_travel, systems.largest_step(scenario))
-        if (frequency := excitation.greatest_frequency(scenario, layout.placed)) > 0.0:
+        limit = min(step_of_contacts(layout, bounds, speeds), of_travel, systems.largest_step(layout.model))
+        if (frequency := excitation.greatest_frequency(layout.model)) > 0.0:
             limit = min(limit, safety_of(scenario) * STABILITY_LIMIT / frequency)
     limit = min(limit, time.end)
     step = limit if time.step == "auto" else time.step

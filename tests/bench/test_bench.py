@@ -27,7 +27,7 @@ from blocksim.bench.harness import (
 from blocksim.bench.registry import MEASUREMENTS, START_UP, StartError, UnknownMeasurementError, choose
 from blocksim.bench.three_blocks import CLOSE, SETTINGS, Solution, converged_levels, scatter_friction
 from blocksim.errors import ExitCode
-from blocksim.scenario import load_scenario, place_bodies
+from blocksim.scenario import Model, load_scenario
 from tests.golden import Golden
 
 NOMINAL = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
@@ -115,8 +115,8 @@ def test_levels_count_as_converged_from_where_all_finer_ones_agree() -> None:
 @pytest.mark.parametrize("scheme", SETTINGS)
 def test_members_of_the_ensemble_differ_in_friction(scheme: str) -> None:
     members = scatter_friction(5, scheme)
-    assert len({scenario.friction.model_dump_json() for scenario in members}) == 5
-    assert {scenario.time.scheme for scenario in members} == {scheme}
+    assert len({model.scenario.friction.model_dump_json() for model in members}) == 5
+    assert {model.scenario.time.scheme for model in members} == {scheme}
 
 
 def test_a_number_is_the_median_of_its_samples_and_what_is_chosen_keeps_the_order_of_the_registry() -> None:
@@ -163,7 +163,7 @@ def test_a_busy_machine_is_reported(load: float, told: str, busy: int, monkeypat
 
 def test_three_blocks_are_those_of_the_scenario_that_ships() -> None:
     ours, shipped = three_blocks(), load_scenario(NOMINAL)
-    assert place_bodies(ours) == place_bodies(shipped)
+    assert Model(ours).bodies == Model(shipped).bodies
     for table in ("materials", "blocks", "ground", "friction", "contact", "time", "gravity"):
         assert getattr(ours, table) == getattr(shipped, table), table
 

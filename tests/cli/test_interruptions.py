@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from blocksim.cli.commands import app
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Model, load_scenario
 from blocksim.simulation.stores.hdf5 import read_frames
 from tests.cli.conftest import SCENARIOS, SOFT, Command, Process, committed, end_of, wait_for, wait_for_frames
 from tests.sizes import in_all
@@ -53,7 +53,9 @@ def assert_same(folder: Path, whole: Path) -> None:
     """Assert that a run has the bits of the whole one, in its final state and in every frame."""
     assert summary_of(folder)["final_state_sha256"] == summary_of(whole)["final_state_sha256"]
     assert (folder / "final.csv").read_bytes() == (whole / "final.csv").read_bytes()
-    one, other = (read_frames(path / "run.h5", load_scenario(path / "scenario.toml")) for path in (folder, whole))
+    one, other = (
+        read_frames(path / "run.h5", Model(load_scenario(path / "scenario.toml"))) for path in (folder, whole)
+    )
     for name in ("step", "x", "y", "angle", "vx", "vy", "spin", "contact_count", "largest_overlap"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
@@ -81,7 +83,7 @@ def frames_in(folder: Path) -> int:
         assert summary_of(folder)["status"] == "finished"
     if committed(folder / "run.h5") == 0:
         return 0
-    frames = read_frames(folder / "run.h5", load_scenario(folder / "scenario.toml"))
+    frames = read_frames(folder / "run.h5", Model(load_scenario(folder / "scenario.toml")))
     assert np.all(np.diff(frames.step) > 0)
     assert np.isfinite(frames.x).all()
     return len(frames)
@@ -176,7 +178,7 @@ def test_disk_that_fills_is_74_and_keeps_what_was_there(process: Process, small_
     assert (ended.code, ended.err.count("\n")) == (74, 1)
     assert "No space left on device" in ended.err
     folder = small_disk / "out"
-    before = len(read_frames(folder / "run.h5", load_scenario(folder / "scenario.toml")))
+    before = len(read_frames(folder / "run.h5", Model(load_scenario(folder / "scenario.toml"))))
     assert before > 100
     assert not [path for path in folder.iterdir() if path.name.startswith(".")]
     small_disk.joinpath("others").unlink()

@@ -17,7 +17,7 @@ import pytest
 
 from blocksim.cli.app import STOPPED_EARLY
 from blocksim.errors import ExitCode
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Model, load_scenario
 from blocksim.simulation.stores.hdf5 import read_frames
 from tests.cli.conftest import PATIENCE, SOFT, Process, committed, end_of, wait_for, wait_for_frames, wait_until
 
@@ -86,7 +86,9 @@ def test_a_process_ends_with_its_exit_code_and_at_most_a_line(process: Process, 
     assert (ended.code, err, bool(ended.out)) == (code, told, name == "last moments")
     assert not list((tmp_path / "out").glob(".*"))
     if name == "full disk":
-        assert len(read_frames(tmp_path / "out" / "run.h5", load_scenario(tmp_path / "out" / "scenario.toml"))) > 0
+        assert (
+            len(read_frames(tmp_path / "out" / "run.h5", Model(load_scenario(tmp_path / "out" / "scenario.toml")))) > 0
+        )
 
 
 def test_nothing_heavy_is_imported_before_ctrl_c_is_handled() -> None:
@@ -186,7 +188,7 @@ def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path) -> 
     wait_for_frames(tmp_path / "out" / "run.h5", running)
     running.kill()
     running.communicate()
-    frames = read_frames(tmp_path / "out" / "run.h5", load_scenario(tmp_path / "out" / "scenario.toml"))
+    frames = read_frames(tmp_path / "out" / "run.h5", Model(load_scenario(tmp_path / "out" / "scenario.toml")))
     assert frames.time[0] == 0.0
     assert frames.x[0].tolist() == pytest.approx([0.016, 0.038, 0.060], abs=1e-6)
 

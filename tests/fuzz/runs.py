@@ -8,7 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from blocksim.scenario import load_scenario, place_bodies
+from blocksim.scenario import Model, load_scenario
 from blocksim.simulation.instruments import Frame, Recorder
 from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 from tests.fuzz.child import Child
@@ -39,11 +39,11 @@ def finished_run(child: Child, folder: Path, scenario: Path) -> Run:
 def _left_open(folder: Path) -> bytes:
     """Return the frames of a run as they lie on the disk while it continues, which is how a kill leaves them."""
     scenario = load_scenario(folder / "scenario.toml")
-    frames = read_frames(folder / "run.h5", scenario)
+    frames = read_frames(folder / "run.h5", Model(scenario))
     motion = np.stack([frames.x, frames.y, frames.angle, frames.vx, frames.vy, frames.spin], axis=1)
     rows = np.stack([*frames.energy.values(), frames.contact_count, frames.largest_overlap], axis=1)
     path = folder / "killed.h5"
-    with FrameFile(path, Recorder(place_bodies(scenario), 1.0, 1e-5), "", list(frames.energy)) as sink:
+    with FrameFile(path, Recorder(Model(scenario).bodies, 1.0, 1e-5), "", list(frames.energy)) as sink:
         for step, moving, row in zip(frames.step.tolist(), motion, rows, strict=True):
             sink.append(Frame(step, (moving,), row))
         sink.commit()

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import REACHED
 from blocksim.kernels.common.mechanics import renew_rotations
+from blocksim.scenario import Model
 from blocksim.scenario.geometry import centre_outline, centroid
-from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.schemes import build
 from blocksim.verification.scene import CaseScene, Simulation
 from blocksim.world.build import arrays_of
 from tests.sizes import in_all
@@ -134,7 +135,7 @@ class Pieces:
             time={} if springs else {"scheme": scheme, "step": 1e-4, "force_step": True, "velocity_tolerance": 1e-12},
         )
         self.numbers = np.array(numbers)
-        self.scene = build_scene(scene.scenario())
+        self.scene = build(Model(scene.scenario()))
         self.fresh = [array.copy() for array in arrays_of(self.scene)]
 
     def throw(self, random: np.random.Generator) -> Simulation:

@@ -27,10 +27,10 @@ from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
 from blocksim.kernels.nonsmooth.packs import gather, pack_all
 from blocksim.kernels.nonsmooth.step import substep
-from blocksim.scenario import Scenario
+from blocksim.scenario import Model, Scenario
 from blocksim.scenario.geometry import Corners, centre_outline, regular
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
-from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.schemes import build
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
 from blocksim.world.build import build_world
 from blocksim.world.nonsmooth import with_more_constraints
@@ -69,7 +69,7 @@ def make_body(
 def blocks_apart(count: int, tables: str) -> World:
     """Return a world of blocks that do not touch, to be copied; `tables` of the scenario in JSON."""
     apart: list[Mapping[str, object]] = [{"x": 0.1 * i, "y": 0.1} for i in range(count)]
-    return build_world(scenario_of(apart, **json.loads(tables)))
+    return build_world(Model(scenario_of(apart, **json.loads(tables))))
 
 
 def pose(*poses: tuple[float, float, float], **tables: object) -> World:
@@ -91,7 +91,7 @@ def rigid(scenario: Scenario, **stepping: Any) -> Scenario:
 
 def begin(scenario: Scenario, **stepping: Any) -> Simulation:
     """Start a scenario with rigid contacts; keywords are keys of [time]."""
-    return Simulation(build_scene(rigid(scenario, **stepping)))
+    return Simulation(build(Model(rigid(scenario, **stepping))))
 
 
 def single(bodies: Sequence[Mapping[str, object]], **values: Any) -> Simulation:
@@ -127,7 +127,7 @@ def posed(blocks: Sequence[Block], **values: Any) -> Nonsmooth:
     stepping = {name: values.pop(name) for name in list(values) if name in Stepping.model_fields}
     size = max([1.0, *(abs(place) for one in blocks for corner in one.outline for place in corner)])
     apart = [{"x": 3.0 * size * i, "y": 2.0 * size, "fixed": one.fixed, **one.shape} for i, one in enumerate(blocks)]
-    scene: Any = build_scene(rigid(CaseScene(apart, time=RIGID, **values).scenario(), end=ENDLESS, **stepping))
+    scene: Any = build(Model(rigid(CaseScene(apart, time=RIGID, **values).scenario(), end=ENDLESS, **stepping)))
     place(scene, blocks)
     load_states(scene)
     scene.world.clock[0].is_started = 1
@@ -258,7 +258,7 @@ def world_of(model: str, spacing: float, width: float, below: float | None) -> W
     """Return the world of two blocks far apart; calls with the same arguments share it."""
     ground = [] if below is None else [{"y": 0.5 * HEIGHT, "width": below, "fixed": True}]
     bodies = [{"y": 0.5, "width": width}, *ground]
-    return build_world(scenario_of(bodies, contact={"model": model, "particle_spacing": spacing}))
+    return build_world(Model(scenario_of(bodies, contact={"model": model, "particle_spacing": spacing})))
 
 
 def touch(
@@ -310,12 +310,12 @@ def soft_world(bodies: list[dict[str, Any]], **tables: Any) -> World:
     contact: Mapping[str, object] = {"restitution": 0.2, **SOFT, **tables.pop("contact", {})}
     friction = {"block_block": 0.31, "block_ground": 0.38}
     time = {"stop_at_rest": False, **tables.pop("time", {})}
-    return build_world(scenario_of(bodies, contact=contact, friction=friction, time=time, **tables))
+    return build_world(Model(scenario_of(bodies, contact=contact, friction=friction, time=time, **tables)))
 
 
 def wall(**contact: object) -> World:
     """Return a wall that falls to pieces: four groups of bodies, all of which touch others."""
-    return build_world(pushed_wall(8, 8, contact={**SOFT, **contact}))
+    return build_world(Model(pushed_wall(8, 8, contact={**SOFT, **contact})))
 
 
 def among_fixed() -> World:

@@ -27,6 +27,7 @@ from blocksim.kernels.explicit.broad_phase import PAIR_SHARE, carry_history, uns
 from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.explicit.persistent_forces import CHANGED, UNTOUCHED, persistent_forces
 from blocksim.kernels.sph.fields import PLACE, find_neighbours
+from blocksim.scenario import Model
 from blocksim.verification.scene import Simulation, scenario_of
 from blocksim.world.build import build_world, empty_lists
 from tests.kernels.references import apart as largest_gap, distances, turning
@@ -148,7 +149,7 @@ def heap(sides: Sides, area: float, **tables: Any) -> World:
         {"x": float(i), "y": 1.0, "fixed": i % 9 == 0, "width": width, "height": height}
         for i, (width, height) in enumerate(sides(random, COUNT).tolist())
     ]
-    world = build_world(scenario_of(bodies, **tables))
+    world = build_world(Model(scenario_of(bodies, **tables)))
     blocks: Any = world.bodies[:COUNT]
     blocks.x, blocks.y = random.uniform(-area / 2, area / 2, (2, COUNT))
     blocks.angle = random.uniform(-4.0, 4.0, COUNT)
@@ -221,7 +222,8 @@ def worlds() -> dict[str, World]:
     bodies = [{"x": 0.04 * i, "y": 1.0} for i in range(BODIES)]
     contact = {"particle_spacing": 0.008}
     made = {
-        model: build_world(scenario_of(bodies, contact={"model": model, **contact})) for model in ("surface", "kernel")
+        model: build_world(Model(scenario_of(bodies, contact={"model": model, **contact})))
+        for model in ("surface", "kernel")
     }
     for world in made.values():
         world.controls.approach = 1.0  # m: all are near to one another
@@ -291,7 +293,7 @@ G = 9.81
 @pytest.fixture(scope="module")
 def world() -> World:
     """Return a block in the air; nothing has been looked at."""
-    return build_world(scenario_of([{"y": 1.0}], contact=SOFT))
+    return build_world(Model(scenario_of([{"y": 1.0}], contact=SOFT)))
 
 
 def test_travel_is_that_of_the_farthest_corner() -> None:
@@ -322,7 +324,7 @@ def jolt() -> World:
     pieces = zeros(2, MOTION_PIECE)
     pieces[1].start, pieces[1].c1 = 2e-3, 2.0
     contact = {**SOFT, "max_overlap": 0.02}
-    world = build_world(scenario_of(bodies, contact=contact, time={"stop_at_rest": False}))
+    world = build_world(Model(scenario_of(bodies, contact=contact, time={"stop_at_rest": False})))
     world.controls.motion_x = 1.0
     return world._replace(motion=pieces)
 

@@ -18,9 +18,8 @@ from blocksim.kernels.soil.neighbours import places_of
 from blocksim.kernels.soil.step import correction, forces_on, raw_gradient, renew_lists, stress_group
 from blocksim.kernels.soil.stress import ROWS, invariants, share_of_row, strain
 from blocksim.kernels.sph.functions import wendland_slope
-from blocksim.scenario import geometry
-from blocksim.scenario.models.soil import SoilTable
-from blocksim.simulation.schemes import build_scene
+from blocksim.scenario import Model, geometry
+from blocksim.simulation.schemes import build
 from blocksim.world.systems.soil_arrays import kind_records
 from blocksim.world.systems.soils import SMOOTHING
 from tests.soils import BLOCKS, FAR, LEFT, SMOOTH_WALLS, Soil, column, right, scene
@@ -30,8 +29,7 @@ STEP = 1e-5  # s
 
 def kind_of(material: str = "rods") -> Any:
     scenario = scene(column(0.04, 0.04, 0.005, material=material))
-    tables = [table for table in scenario.systems["soils"] if isinstance(table, SoilTable)]
-    return kind_records(scenario, tables)[0]
+    return kind_records(Model(scenario))[0]
 
 
 def state_under(pressure: float) -> Any:
@@ -80,7 +78,7 @@ SPACING = 0.005
 def soils() -> Soils:
     """Return two soils of 54 and 63 particles in disorder, with velocities and stresses at random, and their lists."""
     clay = {**column(0.045, 0.03, SPACING, material="clay"), "name": "upper", "y": [0.03, 0.065]}
-    built: Any = build_scene(scene(column(0.045, 0.03, SPACING), clay))
+    built: Any = build(Model(scene(column(0.045, 0.03, SPACING), clay)))
     found: Soils = built.systems[0]
     built.world.team[TEAM_SIZE] = 1
     random = np.random.default_rng(5)
@@ -119,7 +117,7 @@ def test_lists_hold_all_that_are_near_to_any_particle_of_a_cluster_and_each_once
 
 def test_a_list_without_room_is_noticed(soils: Soils) -> None:
     soils.points["x"], soils.points["y"] = 0.0, np.linspace(0.0, SPACING, soils.points.size)
-    built: Any = build_scene(scene(column(0.04, 0.03, SPACING)))
+    built: Any = build(Model(scene(column(0.04, 0.03, SPACING))))
     built.world.team[TEAM_SIZE] = 1
     renew_lists(soils, built.world, 0)
     assert soils.points.size > CLUSTER * NEIGHBOURS
@@ -247,7 +245,7 @@ INTERPRETED = pytest.mark.skipif(not config.DISABLE_JIT, reason="calls kernels w
 
 
 def world_of(**changes: Any) -> Any:
-    return build_scene(scene(column(0.04, 0.04, 0.005), **changes)).world
+    return build(Model(scene(column(0.04, 0.04, 0.005), **changes))).world
 
 
 @INTERPRETED

@@ -8,14 +8,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError, ScenarioError
-from blocksim.scenario import (
-    Document,
-    Scenario,
-    load_scenario,
-    place_bodies,
-    scenario_from_mapping,
-    scenario_to_toml,
-)
+from blocksim.scenario import Document, Model, Scenario, load_scenario, scenario_from_mapping, scenario_to_toml
 from blocksim.scenario.input_files import file_access, read_limited, refuse_large
 from tests.golden import Golden, parsed
 from tests.scenario.conftest import VALID, data_of, edited, read
@@ -42,7 +35,7 @@ def test_forms_become_what_they_stand_for(golden: Golden) -> None:
     """What each section of valid/forms.txt changes in the resolved scenario, and the first block as it lies."""
 
     def resolved(scenario: Scenario) -> list[str]:
-        first = place_bodies(scenario)[0]
+        first = Model(scenario).bodies[0]
         size = f"{first.size_x:g} by {first.size_y:g} by {first.depth:g} m, {first.density:g} kg/m^3"
         return [f"(first block: {size})", *scenario_to_toml(scenario).splitlines()]
 

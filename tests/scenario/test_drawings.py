@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError, ScenarioError, UnavailableError
-from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_hash, scenario_to_toml
-from blocksim.scenario.check import implausible_values
+from blocksim.scenario import Model, Scenario, load_scenario, scenario_hash, scenario_to_toml
 from blocksim.scenario.document import Document
 from blocksim.scenario.structures.drawings import DrawingError, read_drawing, simplify
 from tests.golden import Golden
@@ -51,7 +50,7 @@ def loaded(folder: Path) -> Scenario:
 
 def test_every_polygon_is_a_block_and_its_properties_are_taken(tmp_path: Path) -> None:
     written(tmp_path, collection(feature(SQUARE, block="pier", fixed=True, name="A1", other=3), feature(WEDGE)))
-    pier, wedge = place_bodies(loaded(tmp_path))
+    pier, wedge = Model(loaded(tmp_path)).bodies
     assert (pier.name, pier.block, pier.depth, pier.fixed) == ("A1", "pier", 2.0, True)
     assert (wedge.name, wedge.block, wedge.fixed) == ("2", "stone", False)
     assert len(wedge.outline) == 3  # the point within the straight edge is left out
@@ -65,7 +64,7 @@ def test_results_keep_the_blocks_and_need_the_drawing_no_more(tmp_path: Path) ->
     text = scenario_to_toml(first)
     drawing.unlink()
     again = Document.parse(text).build()
-    assert place_bodies(again) == place_bodies(first)
+    assert Model(again).bodies == Model(first).bodies
     assert scenario_hash(again) == scenario_hash(first)
 
 
@@ -223,7 +222,7 @@ def test_annotations_are_counted_and_said(tmp_path: Path, dxf: Any, golden: Gold
         space.add_text(text)
     space.add_linear_dim(base=(0, 2), p1=(0, 0), p2=(1, 0))
     saved(tmp_path, dxf)
-    golden("\n".join(implausible_values(loaded(tmp_path))))
+    golden("\n".join(Model(loaded(tmp_path)).implausible_values))
 
 
 @pytest.mark.parametrize(("code", "unit", "width"), [(6, None, 1.0), (2, None, 0.3048), (0, None, 1.0), (2, 0.5, 0.5)])
@@ -234,8 +233,8 @@ def test_the_unit_of_a_dxf_file_is_taken_or_compared_with_that_given(
     dxf.modelspace().add_lwpolyline(UNIT, close=True)
     saved(tmp_path, dxf)
     scenario = load_scenario(tmp_path / "scene.toml", {} if unit is None else {"structures.0.unit": unit})
-    assert place_bodies(scenario)[0].size_x == pytest.approx(width)
-    golden("\n".join(implausible_values(scenario)))
+    assert Model(scenario).bodies[0].size_x == pytest.approx(width)
+    golden("\n".join(Model(scenario).implausible_values))
 
 
 def test_parts_of_a_feature_have_names_of_their_own_and_numbers_are_names(tmp_path: Path) -> None:
@@ -243,7 +242,7 @@ def test_parts_of_a_feature_have_names_of_their_own_and_numbers_are_names(tmp_pa
     pair = {"type": "Feature", "properties": {"name": "pair", "fixed": True}, "geometry": both}
     alone = {"type": "MultiPolygon", "coordinates": [[[[x + 5, y] for x, y in SQUARE]]]}
     written(tmp_path, collection(pair, {"type": "Feature", "properties": {"name": 7}, "geometry": alone}))
-    assert [(one.name, one.fixed) for one in place_bodies(loaded(tmp_path))] == [
+    assert [(one.name, one.fixed) for one in Model(loaded(tmp_path)).bodies] == [
         ("pair-1", True), ("pair-2", True), ("7", False)
     ]  # fmt: skip
 
@@ -252,7 +251,7 @@ def test_degrees_are_metres_only_where_that_is_said(tmp_path: Path) -> None:
     far = [[11.5 + 1e-5 * x, 48.1 + 1e-5 * y] for x, y in SQUARE]
     written(tmp_path, collection(feature(far)))
     (tmp_path / "scene.toml").write_text(TEXT.replace("1 cm", "1 m"))
-    assert place_bodies(loaded(tmp_path))[0].size_x == pytest.approx(1e-5)
+    assert Model(loaded(tmp_path)).bodies[0].size_x == pytest.approx(1e-5)
     (tmp_path / "scene.toml").write_text(TEXT.replace(', unit = "1 cm"', ""))
     with pytest.raises(ScenarioError, match=r"\(11\.5, 48\.1\) to \(11\.50001, 48\.10001\) look like degrees"):
         loaded(tmp_path)
@@ -264,7 +263,7 @@ def test_degrees_are_metres_only_where_that_is_said(tmp_path: Path) -> None:
 
 def test_heights_that_are_left_out_are_said(tmp_path: Path) -> None:
     written(tmp_path, collection(feature([[*point, 3.0] for point in SQUARE])))
-    (warning,) = implausible_values(loaded(tmp_path))
+    (warning,) = Model(loaded(tmp_path)).implausible_values
     assert warning.startswith("wall.geojson: third coordinates of 5 points are not read")
 
 
@@ -282,7 +281,7 @@ def test_blocks_of_rounded_coordinates_fit_once_they_are_shrunk(tmp_path: Path) 
     with pytest.raises(ScenarioError, match=r"bodies 1 and 2 overlap by 3\.92232 mm"):
         loaded(tmp_path)
     changes = {"structures.0.shrink": "2 mm", "structures.0.in_place": True}
-    one, other = place_bodies(load_scenario(tmp_path / "scene.toml", changes))
+    one, other = Model(load_scenario(tmp_path / "scene.toml", changes)).bodies
     corners = np.array([(one.x + x, one.y + y) for x, y in one.outline])
     assert corners.min(axis=0) == pytest.approx([0.002, 0.002])
     across = np.array([1.0, -0.2]) / np.hypot(1.0, 0.2)

@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.scenario import GROUND, Document, resolve_pair, scenario_from_mapping
-from blocksim.scenario.check import implausible_values
+from blocksim.scenario import GROUND, Document, Model, resolve_pair, scenario_from_mapping
 from blocksim.scenario.document import Span, locate
 from blocksim.scenario.overrides import format_key, is_known, parse_key
 from blocksim.scenario.spelling import USUAL, meant_word, nearest
@@ -122,7 +121,7 @@ def test_values_that_are_hardly_meant_are_warned_of(golden: Golden) -> None:
         *((values, Document.read(APART).with_values(values).build()) for values in VALUES["after_end"]),
         *((values, scene({**column(0.1, 0.05, 0.005), **values})) for values in VALUES["soil"]),
     ]
-    golden("\n\n".join("\n".join([json.dumps(values), *implausible_values(one)]) for values, one in scenarios))
+    golden("\n\n".join("\n".join([json.dumps(values), *Model(one).implausible_values]) for values, one in scenarios))
 
 
 def test_a_drawing_in_mm_that_is_read_in_m_is_warned_of(tmp_path: Path) -> None:
@@ -132,5 +131,5 @@ def test_a_drawing_in_mm_that_is_read_in_m_is_warned_of(tmp_path: Path) -> None:
     for unit, count in ({}, 1), ({"unit": "1 mm"}, 0):
         structure = {"kind": "polygons", "table": "wall.geojson", "block": "stone", **unit}
         stone = {"blocks.stone": {"depth": 0.1, "material": "aluminium"}, "structures": [structure], "bodies": []}
-        found = implausible_values(replace(Document.read(APART).with_values(stone), folder=tmp_path).build())
+        found = Model(replace(Document.read(APART).with_values(stone), folder=tmp_path).build()).implausible_values
         assert found == ['structures.0: blocks of 55.9 m; for a drawing in mm add unit = "1 mm"'] * count

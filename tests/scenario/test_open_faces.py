@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.scenario import Scenario, open_faces, place_bodies, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, scenario_from_mapping
 from blocksim.simulation import simulate
 from blocksim.world.excitation import load_arrays
 
@@ -37,8 +37,8 @@ def pressed(structure: Mapping[str, Any], face: str, **tables: Any) -> Scenario:
 
 def force_of(scenario: Scenario) -> np.ndarray:
     """Return the force (N) of the water, from the depth at the middle of each face."""
-    placed, total = place_bodies(scenario), np.zeros(2)
-    for _, body, (begin, end, (nx, ny)) in open_faces.acting_loads(scenario, {}):
+    placed, total = Model(scenario).bodies, np.zeros(2)
+    for _, body, (begin, end, (nx, ny)) in Model(scenario).acting_loads:
         one, other = (np.array(placed[body].ground_point(*place)) for place in (begin, end))
         cosine, sine = np.cos(placed[body].angle), np.sin(placed[body].angle)
         depth = LEVEL - 0.5 * (one + other)[1]
@@ -68,7 +68,7 @@ def test_water_presses_on_all_that_is_open_on_a_side(
     structure: Mapping[str, Any], face: str, count: int, across: float, down: float
 ) -> None:
     scenario = pressed(structure, face)
-    assert len([*open_faces.acting_loads(scenario, {})]) == count
+    assert len(Model(scenario).acting_loads) == count
     assert force_of(scenario) == pytest.approx([GAMMA * across, -GAMMA * down], rel=1e-9, abs=1e-6)
 
 
@@ -101,5 +101,5 @@ def test_a_wall_under_water_does_what_pressures_on_each_of_its_blocks_do() -> No
 
 def test_the_bound_of_a_push_is_that_of_one_block_not_the_sum_over_all() -> None:
     few, many = (pressed({**WALL, "rows": rows}, "left", loads=[UNIFORM]) for rows in (2, 10))
-    pushes = [load_arrays(one, place_bodies(one)).push for one in (few, many)]
+    pushes = [load_arrays(Model(one)).push for one in (few, many)]
     assert pushes[0] == pytest.approx(pushes[1])

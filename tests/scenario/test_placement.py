@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import Document, Scenario, load_scenario, place_bodies, scenario_from_mapping
+from blocksim.scenario import Document, Model, Scenario, load_scenario, scenario_from_mapping
 from blocksim.scenario.models.loads import Face
 from blocksim.scenario.open_faces import face_of, strip_before
 from blocksim.scenario.overrides import freeze
@@ -22,7 +22,7 @@ BRICK = {"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "al
 
 
 def test_the_three_blocks_stand_as_in_the_experiment() -> None:
-    bodies = place_bodies(load_scenario(SCENARIOS / "three_blocks_nominal.toml"))
+    bodies = Model(load_scenario(SCENARIOS / "three_blocks_nominal.toml")).bodies
     assert [body.name for body in bodies] == ["1", "2", "3"]
     assert [body.x for body in bodies] == pytest.approx([0.016, 0.038, 0.060], abs=1e-15)
     assert [body.y for body in bodies] == pytest.approx([0.025, 0.075, 0.125], abs=1e-15)
@@ -35,11 +35,11 @@ def test_the_three_blocks_stand_as_in_the_experiment() -> None:
 def test_a_scenario_is_placed_once_and_its_bodies_go_with_it() -> None:
     # placing a million blocks takes seconds; check, build and describe all ask for them
     scenario = load_scenario(SCENARIOS / "wall.toml")
-    bodies = place_bodies(scenario)
-    assert place_bodies(scenario) is bodies
+    bodies = Model(scenario).bodies
+    assert Model(scenario).bodies is bodies
     other = scenario.model_copy(update={"structures": ()})
-    assert place_bodies(other) != bodies
-    assert place_bodies(scenario) == bodies
+    assert Model(other).bodies != bodies
+    assert Model(scenario).bodies == bodies
     weak = weakref.ref(scenario)
     del scenario
     gc.collect()
@@ -49,7 +49,7 @@ def test_a_scenario_is_placed_once_and_its_bodies_go_with_it() -> None:
 def placed_outline(outline: list[list[float]], **tables: object) -> PlacedBody:
     blocks = {"wedge": {"outline": outline, "depth": 0.5, "material": "aluminium"}, "brick": BRICK}
     data = data_of(materials={"aluminium": MATERIAL}, blocks=blocks, **tables)
-    return place_bodies(Scenario.model_validate(freeze(data)))[0]
+    return Model(Scenario.model_validate(freeze(data))).bodies[0]
 
 
 def test_a_block_with_an_outline_is_placed_by_its_centroid() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments, scenario_from_mapping
+from blocksim.scenario import Model, PlacedBody, PlacedSegment, Scenario, place_segments, scenario_from_mapping
 from blocksim.scenario.events import Joint, joint_between
 from blocksim.scenario.placement import surface_heights
 from tests.golden import Golden
@@ -51,7 +51,7 @@ def test_pieces_join_where_they_meet(golden: Golden) -> None:
 def bodies(*places: tuple[float, float, float]) -> list[PlacedBody]:
     """Return bricks of 0.2 x 0.1 m at (x, y, angle in degrees)."""
     placed = [{"block": "brick", "x": x, "y": y, "angle": f"{angle} deg"} for x, y, angle in places]
-    return [*place_bodies(scenario_from_mapping(data_of(structures=(), bodies=tuple(placed))))]
+    return [*Model(scenario_from_mapping(data_of(structures=(), bodies=tuple(placed)))).bodies]
 
 
 def described(joint: Joint | None) -> str:
@@ -88,7 +88,7 @@ def test_a_joint_of_a_drawing_may_have_the_rounding_of_its_corners(corner: float
     ]
     structure = {"kind": "polygons", "block": "brick", "in_place": True, "cells": cells}
     drawn = data_of(blocks=blocks, structures=(structure,), bodies=())
-    lower, upper = place_bodies(scenario_from_mapping(drawn))
+    lower, upper = Model(scenario_from_mapping(drawn)).bodies
     joint = joint_between(lower, upper)
     assert joint is not None
     assert joint.normal == pytest.approx((0.0, 1.0))

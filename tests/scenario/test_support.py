@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-from blocksim.scenario import place_bodies, scenario_from_mapping
-from blocksim.scenario.check import implausible_values
+from blocksim.scenario import Model, scenario_from_mapping
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overlap import support_warning, unsupported
 
@@ -57,10 +56,10 @@ SCENES = {
 def test_blocks_without_a_chain_of_contacts_to_the_ground_are_found(
     scenario: Scenario, loose: list[int], gap: float
 ) -> None:
-    found, nearest = unsupported(scenario, place_bodies(scenario), 1e-4)
+    found, nearest = unsupported(scenario, Model(scenario).bodies, 1e-4)
     assert found == loose
     assert nearest == pytest.approx(gap, rel=1e-6)
-    assert bool(support_warning(scenario, place_bodies(scenario))) == bool(loose)
+    assert bool(support_warning(scenario, Model(scenario).bodies)) == bool(loose)
 
 
 @pytest.mark.parametrize("edge", range(5))
@@ -77,15 +76,15 @@ def test_gap_of_turned_polygons_is_their_distance(angle: float, edge: int) -> No
     bodies[1]["angle"] = f"{facing + math.pi} rad"
     for both in (bodies, bodies[::-1]):
         scenario = scene(blocks=blocks, bodies=both)
-        found, gap = unsupported(scenario, place_bodies(scenario), 1e-4)
+        found, gap = unsupported(scenario, Model(scenario).bodies, 1e-4)
         assert found == [both.index(bodies[1])]
         assert gap == pytest.approx(GAP, rel=1e-9)
 
 
 def test_the_warning_names_the_first_blocks_and_counts_the_others() -> None:
-    (warning,) = implausible_values(scene(at(0, 0), *(at(0, 1 + UP + k) for k in range(7))))
+    (warning,) = Model(scene(at(0, 0), *(at(0, 1 + UP + k) for k in range(7)))).implausible_values
     assert warning == (
         "nothing supports 7 of 8 free blocks: b1, b2, b3, b4, b5 and 2 more; nearest gap 10 mm, "
         "through which they fall at the start"
     )
-    assert implausible_values(scene(at(0, 9), gravity=0.0)) == []
+    assert Model(scene(at(0, 9), gravity=0.0)).implausible_values == []

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.scenario import Scenario, place_bodies
+from blocksim.scenario import Model, Scenario
 from blocksim.scenario.models.actuators import PathTable, stretches_of
 from blocksim.scenario.models.loads import Stretch
 from blocksim.scenario.placement import smallest_width
 from blocksim.simulation import simulate
-from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.schemes import build
 from tests.simulation.test_probes import WEIGHT, both, scene
 
 BRICK = {"block": "brick", "name": "b", "x": 0.0, "y": 0.05}
@@ -78,8 +78,8 @@ def test_rigid_overlaps_are_looked_at_before_a_head_has_gone_half_a_block() -> N
     for speed in (10.0, 1000.0):  # m/s
         path = {"kind": "table", "times": [0.0, 0.1, 0.2], "displacements": [0.0, 0.0, 0.1 * speed]}
         scenario = pushed("nonsmooth", displacement=path)
-        controls = build_scene(scenario).world.controls[0]
-        assert speed * controls.step * controls.check_every <= 0.5 * smallest_width(place_bodies(scenario))
+        controls = build(Model(scenario)).world.controls[0]
+        assert speed * controls.step * controls.check_every <= 0.5 * smallest_width(Model(scenario).bodies)
 
 
 @both

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blocksim.simulation.schemes import build_scene
+from blocksim.scenario import Model
+from blocksim.simulation.schemes import build
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 
 AWAY = 5.0  # m
@@ -35,7 +36,7 @@ def scene_of(seed: int) -> tuple[list[dict[str, Any]], dict[str, Any]]:
 def end_of(bodies: list[dict[str, Any]], contact: Mapping[str, object], **tables: Any) -> NDArray[np.float64]:
     """Return the states of bodies after 0.1 s."""
     scenario = scenario_of(bodies, contact=contact, time=TIME, **tables)
-    return Simulation(build_scene(scenario)).to_time(0.1).state()
+    return Simulation(build(Model(scenario))).to_time(0.1).state()
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -8,7 +8,7 @@ import pytest
 
 from blocksim.bench.harness import pushed_wall
 from blocksim.errors import ExitCode
-from blocksim.scenario import PlacedBody, Scenario, load_scenario, place_bodies, scenario_from_mapping
+from blocksim.scenario import Model, PlacedBody, Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import ensemble, simulate
 from blocksim.simulation.ensemble import EnsembleEnd, MemberEnd, MemberFailure, run_ensemble, run_in_batches
 from blocksim.simulation.loop import STOPPED
@@ -51,7 +51,7 @@ def test_the_number_of_threads_and_the_size_of_batches_change_no_bit(monkeypatch
     monkeypatch.setattr(ensemble, "CHUNK", 1)
     assert [end.columns for end in run_ensemble(scenarios, threads=4)] == one
     monkeypatch.setattr(build, "MOST_BYTES", 2 * scene_size(4, 16, 8).bytes)
-    stacks = [len(stack.placed) for stack in build_stacks(scenarios) if isinstance(stack, SceneStack)]
+    stacks = [len(stack.numbers) for stack in build_stacks([*map(Model, scenarios)]) if isinstance(stack, SceneStack)]
     assert stacks == [2, 2, 2, 1]  # no more memory than a stack may take
     assert [end.columns for end in run_ensemble(scenarios)] == one
 
@@ -192,7 +192,7 @@ def test_no_scenarios_give_no_ends_and_less_than_one_thread_or_member_is_refused
 SHIPPED = SCENARIOS / "three_blocks_nominal.toml"
 FALLING = {"contact.stiffness_scale": 0.001, "time.end": 0.2, "output.every": 0.005}
 both = pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
-PLACED = place_bodies(load_scenario(SHIPPED))  # 32 mm wide, 50 mm high
+PLACED = Model(load_scenario(SHIPPED)).bodies  # 32 mm wide, 50 mm high
 
 
 def frame(**changes: float) -> np.ndarray:
@@ -311,13 +311,13 @@ def test_what_rides_on_a_moving_table_has_not_moved(scheme: str) -> None:
     found = both_ways([held, slides, lifted])
     assert [one.outcome for one in found] == ["stands", "slid", "stands"]
     for scenario, one in zip((held, slides, lifted), found, strict=True):
-        assert np.hypot(*MovingSupport(scenario).way(0.28)) > 3e-3
+        assert np.hypot(*MovingSupport(Model(scenario)).way(0.28)) > 3e-3
         assert one.displacement_mm <= one.largest_displacement_mm + 1e-9
         assert (one.largest_displacement_mm > 0.25) == (one.outcome == "slid")
 
 
 def test_removed_block_stays_where_it_was_on_the_table() -> None:
-    support = MovingSupport(on_a_table("explicit"))
+    support = MovingSupport(Model(on_a_table("explicit")))
     frames = [(frame(), 0.0)]
     for time in (0.14, 0.28):
         rides = frame()

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import OutputError, OutputExistsError
+from blocksim.scenario import Model
 from blocksim.simulation import files, renew_copies
 from blocksim.simulation.files import (
     clear_remains,
@@ -124,10 +125,10 @@ def test_table_of_a_person_is_neither_replaced_nor_removed_as_a_copy(copy: Path,
 def test_folder_holds_only_its_own_scenario_and_rubbish_in_done_is_no_finished_run(
     copy: Path, soft: Shipped, text: str
 ) -> None:
-    assert holds_run(copy, soft())
-    assert not holds_run(copy, soft(friction__block_block=0.3))
+    assert holds_run(copy, Model(soft()))
+    assert not holds_run(copy, Model(soft(friction__block_block=0.3)))
     (copy / "done.json").write_text(text)
-    assert not holds_run(copy, soft())
+    assert not holds_run(copy, Model(soft()))
 
 
 def texts_in(folder: Path) -> dict[str, str]:

@@ -16,7 +16,7 @@ from blocksim.bench.harness import pushed_wall
 from blocksim.errors import ExitCode, InvalidInputError, OutputError
 from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.scenario import Scenario, place_bodies
+from blocksim.scenario import Model, Scenario
 from blocksim.simulation import loop, run_ensemble, schemes, simulate, simulate_into
 from blocksim.simulation.balance import FIRST_CHECK, EnergyLedger
 from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
@@ -29,7 +29,7 @@ from blocksim.simulation.schemes import (
     ALONE,
     BODIES_A_THREAD,
     Team,
-    build_scene,
+    build,
     measure_row,
     team_for,
     useful_threads,
@@ -66,8 +66,8 @@ def test_last_step_is_the_nearest_and_at_least_one(end: float, step: float, last
 @pytest.mark.parametrize("wanted", [0, 3])
 def test_rare_output_does_not_make_the_loop_deaf(soft: Shipped, wanted: int) -> None:
     scenario = soft(time__end=20.0, time__stop_at_rest=False)
-    world = build_world(scenario)
-    recorder = Recorder(place_bodies(scenario), 100.0, float(world.controls[0].step))
+    world = build_world(Model(scenario))
+    recorder = Recorder(Model(scenario).bodies, 100.0, float(world.controls[0].step))
     seen: list[int] = []
     control = loop.RunControl(lambda at: seen.append(at.steps), lambda: "enough" if len(seen) == wanted else "")
     ended = loop.run_loop(world, recorder, 20.0, control=control)
@@ -125,7 +125,7 @@ def test_overlap_of_rigid_contacts_names_its_pair() -> None:
 
 def test_what_failed_is_named_and_runs_that_did_not_fail_keep_their_words() -> None:
     scenario = sliding({})
-    scene, placed = build_scene(scenario), place_bodies(scenario)
+    scene, placed = build(Model(scenario)), Model(scenario).bodies
     told = diagnose(RESIDUAL, REACHED, scene, placed).reason
     assert told.endswith("(the fastest is block above with 1 m/s, step 0)")
     for outcome in (BY_CODE[REACHED], Outcome("interrupted", "stopped by SIGTERM", ExitCode.STOPPED_EARLY)):
@@ -213,7 +213,7 @@ def bits(scene: Any) -> dict[str, bytes]:
 @pytest.fixture(scope="module")
 def alone() -> dict[str, dict[str, bytes]]:
     """Return the walls as one thread leaves them."""
-    return {scheme: bits(ALONE.advance(build_scene(wall(scheme)), last)[0]) for scheme, last in STEPS.items()}
+    return {scheme: bits(ALONE.advance(build(Model(wall(scheme))), last)[0]) for scheme, last in STEPS.items()}
 
 
 @both
@@ -223,7 +223,7 @@ def test_threads_and_more_room_for_pairs_change_no_bit_of_a_collapse_nor_of_its_
     """A team continues where it, one thread or another team has stopped."""
     monkeypatch.setattr(world_build, "PAIRS_PER_BODY", 1)
     monkeypatch.setattr(world_build, "GROWTH", 1.05)
-    scene, last = build_scene(wall(scheme)), STEPS[scheme]
+    scene, last = build(Model(wall(scheme))), STEPS[scheme]
     capacity = sum(array.size for array in arrays_of(scene))
     with Team(3) as together, Team(2) as couple:
         for team, step in ((together, 0), (together, 7), (couple, last // 3), (ALONE, last // 2), (together, last)):
@@ -238,13 +238,13 @@ def test_team_goes_from_one_scene_to_another_whatever_room_that_takes() -> None:
     few, many = (pushed_wall(8, 4, contact={"model": "kernel", "particle_spacing": d}) for d in (5e-3, 1e-3))
     with Team(2) as together:
         for scenario in (few, many):
-            one, other = (team.advance(build_scene(scenario), 20)[0] for team in (together, ALONE))
+            one, other = (team.advance(build(Model(scenario)), 20)[0] for team in (together, ALONE))
             assert bits(one) == bits(other)
 
 
 def test_threads_that_would_only_wait_are_not_used() -> None:
     assert [useful_threads(4, bodies) for bodies in (3, 199, 200, 399, 400, 10_000)] == [1, 1, 2, 3, 4, 4]
-    few = build_scene(wall("explicit", 4, 4))
+    few = build(Model(wall("explicit", 4, 4)))
     assert team_for(few, 4).threads == 1
     assert state_hash(team_for(few, 4).advance(few, 10)[0]) == state_hash(few)
     assert BODIES_A_THREAD == 100  # the README says from how many blocks on threads help
@@ -268,7 +268,7 @@ def test_full_disk_of_the_kernel_cache_is_named(monkeypatch: pytest.MonkeyPatch)
     def fail(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(schemes, "build_scene", fail)
+    monkeypatch.setattr(schemes, "build", fail)
     monkeypatch.setattr("blocksim.simulation.schemes.jit.cache_folder", lambda: "/disk/blocksim/0123")
     schemes.compile_kernels.cache_clear()
     told = r"^/disk/blocksim/0123: the compiled solver cannot be stored there: No space"

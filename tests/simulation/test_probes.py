@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, scenario_from_mapping
 from blocksim.simulation import Result, loop, simulate, simulate_into
 from blocksim.simulation.files import prepare_folder
 from blocksim.simulation.instruments import ProbeSeries
@@ -164,7 +164,7 @@ def test_the_tables_of_probes_are_files_of_the_run(tmp_path: Path) -> None:
 def test_a_file_without_the_probes_is_no_run_of_the_scenario(tmp_path: Path) -> None:
     simulate_into(scene("nonsmooth", [], 0.02), tmp_path / "run")
     with pytest.raises(InvalidInputError, match="probes cannot be read"):
-        read_probes(tmp_path / "run" / "run.h5", scene("nonsmooth", PROBES, 0.02))
+        read_probes(tmp_path / "run" / "run.h5", Model(scene("nonsmooth", PROBES, 0.02)))
 
 
 @both
@@ -191,7 +191,7 @@ def accelerations(result: Result) -> NDArray[np.float64]:
     """Return what contacts and weight make of every block at every frame: along x and y, and of its turning."""
     frames, contacts = result.frames, result.frames.contacts
     assert contacts is not None
-    placed = place_bodies(result.scenario)
+    placed = Model(result.scenario).bodies
     inertia = np.array([(body.mass, body.mass, body.inertia) for body in placed])
     total = np.zeros((len(frames), len(placed), 3))
     forces = forces_on_a(contacts.rows)
@@ -255,7 +255,7 @@ def test_contacts_and_weight_are_all_that_accelerates_blocks(soft: Shipped, mode
 @pytest.mark.parametrize(("name", "scheme"), [("three_blocks_nominal", "explicit"), ("slope", "nonsmooth")])
 def test_contacts_of_blocks_at_rest_hold_their_weight_and_are_counted(soft: Shipped, name: str, scheme: str) -> None:
     result = simulate(soft(name, time__scheme=scheme, output__contacts=True))
-    contacts, placed, tilt = result.frames.contacts, place_bodies(result.scenario), result.scenario.ground.tilt
+    contacts, placed, tilt = result.frames.contacts, Model(result.scenario).bodies, result.scenario.ground.tilt
     assert contacts is not None
     assert result.reason == "at rest"
     weight = sum(body.mass for body in placed if not body.fixed) * result.scenario.gravity

@@ -13,7 +13,7 @@ import pytest
 
 from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.kernels.common.arrays import CACHE_LINE
-from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import Result, simulate, simulate_into
 from blocksim.simulation.checkpoint import (
     DIGEST_BYTES,
@@ -29,7 +29,7 @@ from blocksim.simulation.checkpoint import (
     write_checkpoint,
 )
 from blocksim.simulation.provenance import code_hashes
-from blocksim.simulation.schemes import ALONE, AnyScene, Team, build_scene
+from blocksim.simulation.schemes import ALONE, AnyScene, Team, build
 from blocksim.world.build import arrays_of
 from tests.simulation.sliding import MODELS, assert_same, interrupted_at, sliding
 from tests.sizes import in_all
@@ -86,7 +86,7 @@ def test_lists_that_have_grown_come_back_as_long(tmp_path: Path, monkeypatch: py
     whole = simulate_into(scenario, tmp_path / "whole")
     interrupted_at(scenario, tmp_path / "parts", [whole.summary.steps // 2])
     stored = read_checkpoint(tmp_path / "parts" / "checkpoint.0").head.arrays
-    assert [kind.shape for kind in stored] != [array.shape for array in arrays_of(build_scene(scenario))]
+    assert [kind.shape for kind in stored] != [array.shape for array in arrays_of(build(Model(scenario)))]
     assert_same(whole, simulate_into(scenario, tmp_path / "parts", resume=True))
 
 
@@ -210,12 +210,12 @@ def at(step: int) -> Position:
 @pytest.mark.parametrize("name", ["surface-linear", "particles-linear", "nonsmooth"])
 def test_scene_comes_back_to_the_last_bit_in_arrays_of_the_same_types(tmp_path: Path, name: str) -> None:
     scenario = sliding(MODELS[name])
-    scene, _ = ALONE.advance(build_scene(scenario), 20)
+    scene, _ = ALONE.advance(build(Model(scenario)), 20)
     scene.world.bodies[0].torque = -0.0
     scene.world.bodies[0].fx = np.nan
     write_checkpoint(tmp_path / "checkpoint.0", scene, at(100), origin_of(scenario))
     stored = read_checkpoint(tmp_path / "checkpoint.0")
-    back = restore_scene(stored, build_scene(scenario))
+    back = restore_scene(stored, build(Model(scenario)))
     assert stored.head.position == at(100)
     assert type(back) is type(scene)
     for one, other in zip(arrays_of(back), arrays_of(scene), strict=True):
@@ -225,12 +225,12 @@ def test_scene_comes_back_to_the_last_bit_in_arrays_of_the_same_types(tmp_path: 
             assert np.ascontiguousarray(one[field]).tobytes() == np.ascontiguousarray(other[field]).tobytes()
     if name != "surface-linear":
         with pytest.raises(InvalidInputError, match="do not fit this scene"):
-            restore_scene(stored, build_scene(SCENARIO))
+            restore_scene(stored, build(Model(SCENARIO)))
 
 
 @pytest.fixture
 def written(tmp_path: Path) -> Path:
-    write_checkpoint(tmp_path / "checkpoint.0", build_scene(SCENARIO), at(100), origin_of(SCENARIO))
+    write_checkpoint(tmp_path / "checkpoint.0", build(Model(SCENARIO)), at(100), origin_of(SCENARIO))
     return tmp_path / "checkpoint.0"
 
 
@@ -267,7 +267,7 @@ def test_shapes_that_no_array_has_are_refused(written: Path, shape: str) -> None
     old = f",{json.dumps(read_checkpoint(written).head.arrays[0].shape)}]".encode()
     stored = read_checkpoint(forged(written, old, f",{shape}]".encode()))
     with pytest.raises(InvalidInputError, match="does not fit this scene"):
-        restore_scene(stored, build_scene(SCENARIO))
+        restore_scene(stored, build(Model(SCENARIO)))
 
 
 def test_checkpoint_larger_than_the_memory_is_not_read(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -282,7 +282,7 @@ def steps_in(folder: Path) -> dict[str, int]:
 
 def test_two_are_kept_by_turns_after_the_frames(tmp_path: Path) -> None:
     seen: list[int] = []  # checkpoints that are there when frames go to the disk
-    scene = build_scene(SCENARIO)
+    scene = build(Model(SCENARIO))
     writer = CheckpointWriter(
         tmp_path, origin_of(SCENARIO), lambda: seen.append(len(list(tmp_path.glob("checkpoint.*"))))
     )
@@ -296,7 +296,7 @@ def test_two_are_kept_by_turns_after_the_frames(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["checkpoint.0", "checkpoint.1"])
 def test_the_one_that_a_run_continues_from_is_replaced_last(tmp_path: Path, name: str) -> None:
     past = Past(resumed_from=(7,), checkpoint=tmp_path / name, step=7)
-    CheckpointWriter(tmp_path, origin_of(SCENARIO), lambda: None, past=past).write(build_scene(SCENARIO), at(10))
+    CheckpointWriter(tmp_path, origin_of(SCENARIO), lambda: None, past=past).write(build(Model(SCENARIO)), at(10))
     (written,) = steps_in(tmp_path)
     assert written != name
     assert read_checkpoint(tmp_path / written).head.position.resumed_from == (7,)

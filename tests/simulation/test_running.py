@@ -5,11 +5,10 @@ import json
 import math
 import os
 import platform
-import weakref
+import tomllib
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import llvmlite.binding
 import numba
@@ -17,12 +16,12 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario, load_scenario, placement
+from blocksim.scenario import Model, Scenario, load_scenario, placement, scenario_to_toml
 from blocksim.simulation import Progress, Result, provenance, simulate_into
 from blocksim.simulation.balance import RESIDUAL_PROMISE
 from blocksim.simulation.results import read_summary
 from blocksim.simulation.run import RunCallbacks, bytes_needed
-from blocksim.simulation.schemes import build_scene, compile_kernels
+from blocksim.simulation.schemes import build, compile_kernels
 from blocksim.simulation.trajectory import COLUMNS, Frames, as_frame, csv_text, final_columns, read_table
 from blocksim.world.step import StepError
 from tests.golden import Golden
@@ -85,22 +84,24 @@ def test_resolved_scenario_runs_to_the_same_bits_from_its_own_folder_too(
 def test_estimate_is_no_less_than_what_a_run_leaves(tmp_path: Path) -> None:
     scenario = sliding({}, end=0.05, every=5e-5)
     simulate_into(scenario, tmp_path / "run")
-    needed = bytes_needed(scenario, build_scene(scenario))
+    needed = bytes_needed(Model(scenario), build(Model(scenario)))
     assert 0.5 * needed < (tmp_path / "run" / "run.h5").stat().st_size < 1.3 * needed
 
 
 def test_blocks_are_placed_once_from_loading_to_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     times: list[str] = []
-    new = placement.Placement
+    place = placement.place
 
-    def counted(scenario: weakref.ref[Scenario], *parts: Any) -> placement.Placement:
-        times.append(getattr(scenario(), "name", ""))
-        return new(scenario, *parts)
+    def counted(scenario: Scenario) -> placement.Placement:
+        times.append(scenario.name)
+        return place(scenario)
 
-    monkeypatch.setattr(placement, "Placement", counted)
-    compile_kernels.cache_clear()  # the scene that is compiled with is placed on the way
-    simulate_into(sliding({"time": {"scheme": "nonsmooth"}}, end=0.01), tmp_path / "run")
-    assert (times.count("sliding"), times.count("compile")) == (1, 1)
+    monkeypatch.setattr(placement, "place", counted)
+    data = tomllib.loads(scenario_to_toml(sliding({"time": {"scheme": "nonsmooth"}}, end=0.01)))
+    compile_kernels("nonsmooth")
+    times.clear()
+    simulate_into(Model(data), tmp_path / "run")
+    assert times == ["sliding"]
 
 
 def test_a_run_that_cannot_be_built_is_refused_before_it_compiles_and_compiling_can_be_stopped(
@@ -219,9 +220,9 @@ def test_command_with_a_name_that_is_no_text_can_be_written(kept: Result, monkey
 
 
 def test_edited_code_gives_runs_another_name(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = provenance.run_hash(soft())
+    before = provenance.run_hash(Model(soft()))
     monkeypatch.setattr(provenance, "code_hash", lambda: "of other code")
-    assert provenance.run_hash(soft()) != before
+    assert provenance.run_hash(Model(soft())) != before
 
 
 # 250 blocks, a minute or so; with BLOCKSIM_SOAK=full the 1000 of scenarios/wall.toml, four minutes

@@ -13,7 +13,7 @@ import pytest
 import blocksim
 from blocksim.analysis.bits import differences
 from blocksim.errors import ExitCode, InvalidInputError, ScenarioError
-from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, scenario_from_mapping
 from blocksim.simulation import Result, run_ensemble, schemes, simulate
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.loop import BY_CODE, diagnose
@@ -249,7 +249,7 @@ def test_exports_have_a_row_a_particle_and_frame_with_what_soil_shows(run: Resul
     assert [float(row["y_mm"]) for row in rows] == (1e3 * run.frames.others[0]["y"]).ravel().tolist()
     assert len(tidy_table(run.frames, "soils")) == 100 * len(run.frames)
     assert data_set(run.frames, "soil")["soils_vy"].shape == (len(run.frames), 100)
-    write_vtkhdf(tmp_path / "run.vtkhdf", run.frames, SCENE)
+    write_vtkhdf(tmp_path / "run.vtkhdf", run.frames, Model(SCENE))
     with h5py.File(tmp_path / "run.vtkhdf") as file:
         data = file["VTKHDF/CellData"]
         assert {"displacement_mm", "pressure_Pa", "syy_Pa", "plastic_strain"} <= set(data)
@@ -257,10 +257,10 @@ def test_exports_have_a_row_a_particle_and_frame_with_what_soil_shows(run: Resul
 
 
 def test_soil_that_has_no_finite_place_ends_the_run_and_is_named() -> None:
-    one = build(SCENE)
-    one.scene.systems[0].points.y[1] = np.nan
-    after, code = schemes.ALONE.advance(one.scene, 100_000)
-    told = diagnose(BY_CODE[code], code, after, one.placed)
+    one = build(Model(SCENE))
+    one.systems[0].points.y[1] = np.nan  # type: ignore[union-attr]
+    after, code = schemes.ALONE.advance(one, 100_000)
+    told = diagnose(BY_CODE[code], code, after, Model(SCENE).bodies)
     assert told.exit_code == ExitCode.NUMERICAL_FAILURE
     assert "(soils, step " in told.reason
 
@@ -268,23 +268,23 @@ def test_soil_that_has_no_finite_place_ends_the_run_and_is_named() -> None:
 def test_a_soil_that_is_not_modelled_or_gets_other_functions_once_compiled_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    build(SCENE)
+    build(Model(SCENE))
     monkeypatch.setitem(INTERACTIONS, ("soils", "supports"), lambda: float)
     with pytest.raises(ValueError, match="compiled with other functions"):
-        build(SCENE)
+        build(Model(SCENE))
     monkeypatch.delitem(INTERACTIONS, ("soils", "blocks"))
     for use in (blocksim.run, describe):
         with pytest.raises(InvalidInputError, match=r"^soils and blocks cannot be in one scene: .* not modelled"):
-            use(SCENE)
+            use(Model(SCENE))
 
 
 def test_threads_are_of_use_for_many_particles() -> None:
-    one = build(SCENE).scene
+    one = build(Model(SCENE))
     assert [schemes.team_for(one, 4, elements).threads for elements in (0, 3, 250, 1000)] == [1, 1, 2, 4]
 
 
 def test_check_counts_the_particles() -> None:
-    few, many = (describe(scene(column(0.1, 0.05 * k, 0.005, start="ramp"))) for k in (1, 2))
+    few, many = (describe(Model(scene(column(0.1, 0.05 * k, 0.005, start="ramp")))) for k in (1, 2))
     assert (few.systems, many.systems) == ({"soils": 200}, {"soils": 400})
     cost, quantities = SOILS.cost, len(SOILS.quantities)
     frames = math.ceil(many.frames / chunk_rows(400)) * chunk_rows(400)  # run.h5 has room for whole chunks
@@ -294,7 +294,7 @@ def test_check_counts_the_particles() -> None:
 
 @pytest.mark.parametrize("kind", ["strip", "final", "profile"])
 def test_pictures_show_soil(run: Result, alone: Result, kind: str, tmp_path: Path) -> None:
-    paint = paint_of("pressure", run.frames, SCENE)
+    paint = paint_of("pressure", run.frames, Model(SCENE))
     run_kind(kind)(run.frames, tmp_path / "one.svg", PictureOptions("title", paint=paint))
     assert (tmp_path / "one.svg").read_text().count("<path") > (100 if kind != "profile" else 8)
     assert blocksim.plot(alone, tmp_path / "alone.png", kind=kind).stat().st_size > 5000
@@ -304,7 +304,7 @@ def test_pictures_show_soil(run: Result, alone: Result, kind: str, tmp_path: Pat
 
 
 def test_soil_has_the_colour_asked_for_all_in_the_player_and_blocks_keep_theirs(run: Result) -> None:
-    usual, speed = (paint_of(name, run.frames, SCENE) for name in ("block", "speed"))
+    usual, speed = (paint_of(name, run.frames, Model(SCENE)) for name in ("block", "speed"))
     assert usual.scale is not None
     assert usual.scale.label == "displacement (mm)"
     assert (usual.fills(0), any(usual.elements)) == (speed.fills(0), True)
@@ -312,7 +312,7 @@ def test_soil_has_the_colour_asked_for_all_in_the_player_and_blocks_keep_theirs(
     assert len(set(first)) == 1
     assert len(set(last)) > 10
     with pytest.raises(InvalidInputError, match="unknown colour 'plastic' in this run"):
-        paint_of("plastic", toppling(2), SCENE)
+        paint_of("plastic", toppling(2), Model(SCENE))
     (soil,) = pack_frames(run.frames).data["systems"]  # of the player
     labels = [shade["label"].split(" (")[0] for shade in soil["shades"]]
     assert labels == ["displacement", "speed", "plastic shear strain", "mean pressure"]
@@ -350,13 +350,13 @@ def test_soil_alone_falls_as_beside_a_block_far_away_and_needs_no_wall(alone: Re
 def test_soil_alone_is_exported_and_reported_and_what_is_about_blocks_says_that_there_are_none(
     alone: Result, tmp_path: Path
 ) -> None:
-    assert write_vtkhdf(tmp_path / "run.vtkhdf", alone.frames, alone.scenario) == len(alone.frames.time)
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", alone.frames, Model(alone.scenario)) == len(alone.frames.time)
     assert blocksim.report(alone, out=tmp_path / "run.html").stat().st_size > 20_000
     assert blocksim.animate(alone, tmp_path / "run.gif").stat().st_size > 5000
     with pytest.raises(InvalidInputError, match="a history is that of blocks"):
         blocksim.plot(alone, tmp_path / "picture.png", kind="history")
     with pytest.raises(InvalidInputError, match="no block to export"):
-        write_geojson(tmp_path / "run.geojson", alone.frames, alone.scenario)
+        write_geojson(tmp_path / "run.geojson", alone.frames, Model(alone.scenario))
 
 
 def test_soil_on_the_solid_side_of_a_wall_is_refused_as_it_would_pass_through() -> None:

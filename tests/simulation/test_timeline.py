@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import StoppedEarlyError
-from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, scenario_from_mapping
 from blocksim.scenario.motion import drives_of
 from blocksim.simulation import Result, read_result, simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy
@@ -289,8 +289,8 @@ def stack(scheme: str, *, hold: tuple[str, ...] = (), friction: float = 0.6, **c
 
 def settled_scene(scenario: Scenario) -> tuple[Any, Any]:
     """Return the scene at time zero, and how it has settled."""
-    built = build(scenario)
-    scene, settled = initial_scene(built.scene, scenario, built.placed, ALONE)
+    model = Model(scenario)
+    scene, settled = initial_scene(build(model), model, ALONE)
     return ALONE.advance(scene, 0)[0], settled
 
 
@@ -316,8 +316,8 @@ def test_rigid_contacts_hold_the_weight_from_the_first_step_on_and_what_is_let_g
 ) -> None:
     bodies = [*(stone(0.05 * k, 0.1 + 0.2 * k) for k in range(3)), stone(2.0, 3.0, name="held")]
     scenario = stack("nonsmooth", bodies=bodies, hold=("held",), contact={"restitution": restitution})
-    built = build(scenario)
-    scene, _ = settle(built.scene, scenario, built.placed, ALONE)
+    model = Model(scenario)
+    scene, _ = settle(build(model), model, ALONE)
     start, step = places(scene), float(scene.world.controls[0].step)
     for number in (1, 2, 5):
         scene, _ = ALONE.advance(scene, number)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Model, load_scenario
 from blocksim.statics.blockwork import Blockwork
 from blocksim.statics.joint_forces import joint_forces
 from blocksim.statics.programme import Equilibrium, Programme, horizontal_margin
@@ -22,7 +22,7 @@ def blockwork(friction: float, **tables: Any) -> Blockwork:
     """Return the blocks of a scenario in one material; every block is given by its width and height (m)."""
     rules = {"block_block": friction, "block_ground": friction}
     return Blockwork.of(
-        load_scenario({"schema": 1, "name": "s", "materials": STONE, "friction": rules, "time": TIME, **tables})
+        Model(load_scenario({"schema": 1, "name": "s", "materials": STONE, "friction": rules, "time": TIME, **tables}))
     )
 
 
@@ -46,7 +46,7 @@ def test_least_thickness_of_an_arch_of_27_voussoirs_is_the_published_one(frictio
 
 
 def test_wall_one_of_ferris_and_tin_loi_has_their_bound_and_nearly_their_least_factor() -> None:
-    blocks = Blockwork.of(load_scenario("scenarios/tilting_wall.toml", {"ground.tilt": "0 deg"}))
+    blocks = Blockwork.of(Model(load_scenario("scenarios/tilting_wall.toml", {"ground.tilt": "0 deg"})))
     for sign in (1.0, -1.0):  # the wall is symmetric
         found = pushed(blocks, sign)
         assert found.factor == pytest.approx(0.64286, rel=EXACT)
@@ -91,7 +91,7 @@ def test_below_a_head_that_stays_parallel_a_wall_carries_what_virtual_work_says(
 
 
 def test_forces_are_in_equilibrium_and_in_their_cones_and_the_mechanism_does_the_work_that_the_factor_says() -> None:
-    blocks = Blockwork.of(load_scenario("scenarios/tilting_wall.toml", {"ground.tilt": "0 deg"}))
+    blocks = Blockwork.of(Model(load_scenario("scenarios/tilting_wall.toml", {"ground.tilt": "0 deg"})))
     found = pushed(blocks)
     assert (found.normal >= -1e-9).all()
     assert (np.abs(found.shear) <= blocks.friction * found.normal + 1e-6).all()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import ExitCode
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario import Model, Scenario, load_scenario
 from blocksim.simulation import trajectory
 from blocksim.simulation.rest_state import SettleError, settle
 from blocksim.simulation.schemes import ALONE, build, scheme_of
@@ -35,9 +35,9 @@ class Settled(NamedTuple):
 
 
 def settled(scenario: Scenario) -> Settled:
-    built = build(scenario)
-    scene, found = settle(built.scene, scenario, built.placed, ALONE)
-    contacts = scheme_of(scene).contacts(scene, len(built.placed))
+    model = Model(scenario)
+    scene, found = settle(build(model), model, ALONE)
+    contacts = scheme_of(scene).contacts(scene, len(model.bodies))
     return Settled(scene.world, contacts, found.steps)
 
 

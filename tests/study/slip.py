@@ -7,7 +7,7 @@ from typing import ClassVar
 from pydantic import BaseModel
 
 from blocksim.options import silent
-from blocksim.scenario import Document
+from blocksim.scenario import Model
 from blocksim.study.answer import Answer, Overview, Study
 from blocksim.study.executors import Execution
 from blocksim.study.rows import Row
@@ -50,9 +50,9 @@ def slip(
     on_row: Callable[[float, Row], None] = silent,
 ) -> SlipAnswer:
     """Run a block at every tilt."""
-    document, folder = Document.from_mapping(block_on_a_slope(SQUAT)), Path(out)
+    base, folder = Model(block_on_a_slope(SQUAT)), Path(out)
     name = "-".join(f"{tilt:g}" for tilt in tilts)
-    with runs_of(document, document.build(), folder, SlipAnswer.files, name, execution or Execution()) as runs:
+    with runs_of(base, base, folder, SlipAnswer.files, name, execution or Execution()) as runs:
         rows = runs.rows_of({tilt: {"ground.tilt": f"{tilt} deg"} for tilt in tilts}, on_row)
         points = tuple(Point(tilt=tilt, outcome=str(row["outcome"])) for tilt, row in rows.items())
         cells = [(one.tilt, one.outcome) for one in points]

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from blocksim.scenario import Document, Scenario
+from blocksim.scenario import Document, Model, Scenario
 from blocksim.scenario.placement import soil_tables
 from blocksim.study.converge import (
     Convergence,
@@ -41,7 +41,7 @@ def slide() -> Scenario:
 
 @pytest.fixture(scope="module")
 def coordinates(slide: Scenario) -> Coordinates:
-    return Coordinates(slide)
+    return Coordinates(Model(slide).bodies)
 
 
 def finished(x_mm: float, rotation_deg: float = 0.0, seconds: float = 1.0, y_mm: float = 12.5) -> Row:

@@ -79,7 +79,7 @@ def test_a_limit_is_drawn_as_its_mechanism_beside_the_last_that_stands(
         run = read_run(slid.folder / "cases" / name)
         release = "always" if value == change.high else "at rest"  # it falls before time zero
         kept = {"output.contacts": True, "start.release": release, "time.stop_at_rest": value != change.high}
-        assert run.scenario == replace_values(slid.plan.scenario_at(value), kept)
+        assert run.scenario == replace_values(slid.plan.model_at(value).scenario, kept)
         if value == change.low:
             assert float(run.frames.time[-1]) == pytest.approx(slid.rows[value]["seconds"])
     assert plot(slid) == Path("slope_mechanism.png")
@@ -126,8 +126,8 @@ def test_sustained_loads_come_at_rest_unless_told_not_to_and_others_as_they_are(
         (False, slope | {"events": [{"at": 0.1, "remove": ["1"]}]}),
     ):
         plan = read_limit(Document.from_mapping(scene), TILTED, stands="outcome != fell")
-        assert plan.scenario_at(10.0).start.settle is settles
-        assert is_sustained(plan.scenario_at(10.0)) is (settles or scene == unsettled(slope))
+        assert plan.model_at(10.0).scenario.start.settle is settles
+        assert is_sustained(plan.model_at(10.0)) is (settles or scene == unsettled(slope))
 
 
 def test_limits_of_rigid_contacts_that_go_with_the_step_hold_those_of_half_of_it(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.errors import StoppedEarlyError
-from blocksim.scenario import Scenario, document_of, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, document_of, scenario_from_mapping
 from blocksim.study.criterion import DEFAULT, read_criterion
 from blocksim.study.executors import Batch, Execution, Rounds, RunSetting, Task
 from blocksim.study.limit import find_limit, rest_acceleration
@@ -127,7 +127,7 @@ class Formula(Execution):
     def ready(self, _: Path | None = None, /) -> tuple[Rounds, RunSetting]:
         def run(tasks: Iterator[Task], _: RunSetting) -> Generator[Batch, None, None]:
             for task in tasks:
-                yield Batch((task,), (self.row(task.scenario),), 0.0, "")
+                yield Batch((task,), (self.row(task.model.scenario),), 0.0, "")
 
         return lambda: nullcontext(run), RunSetting(1)
 
@@ -323,5 +323,5 @@ def test_springs_of_hertz_give_way_by_another_power_and_a_step_by_hand_is_shorte
 @pytest.mark.parametrize("gravity", [0.5, 9.81])
 def test_what_rest_cannot_tell_from_falling_is_an_acceleration_under_any_gravity(gravity: float) -> None:
     one = scenario_from_mapping({**block_on_a_slope((0.1, 0.1)), "gravity": gravity, "start": {"settle": False}})
-    assert 0.0 < rest_acceleration(one, None) <= 1e-2
-    assert rest_acceleration(one.model_copy(update={"gravity": 0.0}), None) == 0.0
+    assert 0.0 < rest_acceleration(Model(one), None) <= 1e-2
+    assert rest_acceleration(Model(one.model_copy(update={"gravity": 0.0})), None) == 0.0

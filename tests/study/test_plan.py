@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Document, Sweep, scenario_to_toml
+from blocksim.scenario import Document, Model, Sweep, scenario_to_toml
 from blocksim.scenario.models.study import Normal, Uniform
 from blocksim.simulation.provenance import run_hash
 from blocksim.study import plan
@@ -57,8 +57,9 @@ def test_impossible_combination_is_kept_with_its_reason_beside_the_scenario_that
 ) -> None:
     good, bad = cases(nominal, {KINETIC: [0.1, 0.9], OVERLAP: ["9 mm"]})
     by_hand = nominal.with_values({KINETIC: 0.1, OVERLAP: "9 mm"}).build()
-    assert (good.scenario, good.name, by_hand.sweep) == (by_hand, run_hash(by_hand), None)
-    assert bad.scenario is None
+    assert good.model is not None
+    assert (good.model.scenario, good.name, by_hand.sweep) == (by_hand, run_hash(Model(by_hand)), None)
+    assert bad.model is None
     assert "kinetic friction 0.9 is above static friction 0.31" in bad.problem
 
 

@@ -11,7 +11,7 @@ import blocksim
 from blocksim.analysis.compare import Comparison
 from blocksim.analysis.metrics import Settings
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario import Document, Scenario, load_scenario
+from blocksim.scenario import Document, Model, Scenario, load_scenario
 from blocksim.simulation import Result, simulate_into
 from blocksim.simulation.instruments import bytes_of_series
 from blocksim.study.compare import compare, compare_run, compare_sweep
@@ -148,10 +148,10 @@ def test_size_of_a_run_is_forecast_within_a_factor_of_two(
 ) -> None:
     scenario = load_scenario(SCENARIOS / f"{name}.toml", changes)
     result = run(scenario, out=tmp_path)
-    described = describe(scenario)
+    described = describe(Model(scenario))
     assert result.frames.time.size > 0.9 * described.frames  # nothing came to rest before
     stored = sum(path.stat().st_size for path in tmp_path.iterdir() if path.name.startswith(("run.h5", "probe-")))
-    told = described.bytes + bytes_of_series(scenario, described.steps, described.step, 14)
+    told = described.bytes + bytes_of_series(Model(scenario), described.steps, described.step, 14)
     assert 0.5 * stored < told < 2.0 * stored
 
 

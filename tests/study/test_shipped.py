@@ -27,7 +27,7 @@ def run_shipped(name: str, **overrides: object) -> Result:
 def test_shipped_studies_have_cases_that_can_be_run(name: str, count: int) -> None:
     found = cases(Document.read(SCENARIOS / f"{name}.toml"))
     assert len(found) == count
-    assert not [case.problem for case in map(found.__getitem__, range(0, count, count // 50)) if case.scenario is None]
+    assert not [case.problem for case in map(found.__getitem__, range(0, count, count // 50)) if case.model is None]
 
 
 ENDS: dict[str, tuple[str, dict[str, Any], bool]] = {

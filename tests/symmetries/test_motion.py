@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, strategies as st
 
-from blocksim.scenario import scenario_from_mapping
-from blocksim.simulation.schemes import build_scene
+from blocksim.scenario import Model, scenario_from_mapping
+from blocksim.simulation.schemes import build
 from blocksim.verification.scene import Simulation
 from tests.symmetries.scenes import (
     BEFORE_CHAOS,
@@ -164,7 +164,7 @@ def test_no_size_of_blocks_is_special(name: str) -> None:
             "contact": {"restitution": restitution, **lengths},
             "time": {"end": 10.0 * time, **rest, **({"scheme": RIGID, **rigid} if scheme == RIGID else {})},
         }
-        run = Simulation(build_scene(scenario_from_mapping(tables)))
+        run = Simulation(build(Model(scenario_from_mapping(tables))))
         units = np.array([size, size, 1.0, size / time, size / time, 1.0 / time])
         return run.to_step(steps).state() / units
 

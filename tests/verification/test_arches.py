@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Model, load_scenario
 from blocksim.simulation import simulate
-from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.schemes import build
 from blocksim.statics.blockwork import Blockwork
 from blocksim.statics.joint_forces import joint_forces
 from blocksim.statics.programme import Programme
@@ -26,7 +26,7 @@ PULL = 0.37361  # along the ground over weight, under which the arch of tilting_
 def after_a_second(name: str, **values: Any) -> tuple[Simulation, float]:
     """Return a shipped arch on its way, at the step it takes by itself, and the speed (m/s) of its fastest block."""
     scenario = load_scenario(SCENARIOS / f"{name}.toml", {"time.step": "auto", **values})
-    run = Simulation(build_scene(scenario)).to_time(1.0)
+    run = Simulation(build(Model(scenario))).to_time(1.0)
     return run, float(np.hypot(run.bodies.vx, run.bodies.vy).max())
 
 
@@ -79,7 +79,7 @@ def test_the_table_beside_the_picture_is_what_limit_analysis_gives() -> None:
 def test_joints_of_an_arch_about_to_fall_on_a_tilting_table_press_where_statics_has_them() -> None:
     """Seven voussoirs on springs at 0.999 of the pull under which they fall: four joints press at a corner."""
     arch, level = SCENARIOS / "tilting_arch.toml", {"time.scheme": "nonsmooth"}
-    blocks = Blockwork.of(load_scenario(arch, {**level, "ground.tilt": "0 deg"}))
+    blocks = Blockwork.of(Model(load_scenario(arch, {**level, "ground.tilt": "0 deg"})))
     found = Programme(blocks).greatest(blocks.forces, -blocks.horizontal)  # to the left
     assert found is not None
     assert found.factor == pytest.approx(PULL, abs=5e-6)

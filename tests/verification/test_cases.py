@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.scenario import Model, PlacedBody, Scenario
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Case, CaseOutcome, Row, Setting, at_least, run_case
 from blocksim.verification.cases import CASES, SettingError, choose_cases, exclusions
@@ -117,7 +117,7 @@ def test_rectangles_given_as_outlines_have_the_same_answers(
     case: Case, setting: Setting, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def as_outlines(scenario: Scenario) -> tuple[PlacedBody, ...]:
-        return tuple(body._replace(outline=body.corners) for body in place_bodies(scenario))
+        return tuple(body._replace(outline=body.corners) for body in Model(scenario).bodies)
 
     plain = run_case(case, setting)
     assert missed(plain) == []

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import REACHED, World
+from blocksim.scenario import Model
 from blocksim.scenario.geometry import Corners, centre_outline, regular, section_of
 from blocksim.verification import impacts
 from blocksim.verification.case import Setting
@@ -107,11 +108,11 @@ def motion_bits(scene: Simulation) -> dict[str, bytes]:
 
 def test_a_crowd_moves_the_same_to_the_last_bit_with_any_skin_of_the_scenario() -> None:
     contact = {"stiffness_scale": 1e-3}
-    usual = float(build_world(pushed_wall(5, 8, contact=contact)).controls[0].skin)
+    usual = float(build_world(Model(pushed_wall(5, 8, contact=contact))).controls[0].skin)
     ends, rebuilds = [], []
     for share in (0.5, 1.0, 3.0):
         skin = {} if share == 1.0 else {"skin": share * usual}
-        scene = Simulation(build_world(pushed_wall(5, 8, contact={**contact, **skin}))).to_time(0.15)
+        scene = Simulation(build_world(Model(pushed_wall(5, 8, contact={**contact, **skin})))).to_time(0.15)
         assert scene.status == REACHED
         ends.append(motion_bits(scene))
         rebuilds.append(int(scene.world.clock[0].rebuilds))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from blocksim.analysis.experiment import load_table
-from blocksim.scenario import PlacedSegment, scenario_from_mapping
+from blocksim.scenario import Model, PlacedSegment, scenario_from_mapping
 from blocksim.scenario.geometry import regular
 from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure, Stretch
 from blocksim.scenario.motion import MotionPieces
@@ -99,7 +99,7 @@ def acting(loads: Sequence[Mapping[str, object]], **tables: Any) -> Support:
     block = {"width": 0.2, "height": 0.4, "length": 0.1, "material": "oak"}
     oak = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
     scene = {"schema": 1, "name": "a", "materials": {"oak": oak}, "blocks": {"brick": block}, "bodies": [BODY]}
-    return support_of(scenario_from_mapping({**scene, "time": {"end": 9.0}, "loads": loads, **tables}))
+    return support_of(Model(scenario_from_mapping({**scene, "time": {"end": 9.0}, "loads": loads, **tables})))
 
 
 def slab(angles: Sequence[float], x: float = 0.0) -> Frames:

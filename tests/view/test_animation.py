@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from PIL.GifImagePlugin import GifImageFile
 
 from blocksim.errors import OutputError
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Model
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.trajectory import Frames
 from blocksim.view.animation import Animation, Look, Pace, Pixels, beyond_view, draw_animation, frame_times
@@ -45,7 +45,7 @@ def near_the_centre(frames: Frames, frame: int, block: int) -> tuple[float, floa
 def test_blocks_are_where_they_were_recorded_in_the_colours_of_other_pictures(support: Support, paint: str) -> None:
     frames = toppling(2)
     frames.vx[:, 1] *= 2.0
-    painted = PAINTS[paint](frames, load_scenario(SCENARIOS / "slope.toml"))
+    painted = PAINTS[paint](frames, Model(SCENARIOS / "slope.toml"))
     animation = Animation(frames, support, Look(width=400, trails=paint == "block", paint=painted))
     for frame in (0, 20, 39, 0):  # any order
         picture = animation.picture(frame)

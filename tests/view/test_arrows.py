@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
+from blocksim.scenario import Model
 from blocksim.simulation import instruments, simulate_into
 from blocksim.simulation.trajectory import CONTACT_ROW, Contacts, Frames
 from blocksim.view import run_data
@@ -92,9 +93,9 @@ def test_every_kind_of_probe_has_a_picture(kind: str) -> None:
 def test_an_actuator_pushes_as_its_record_says() -> None:
     """Its arrow in pictures, between two samples."""
     scenario, record = pushed("nonsmooth"), probe("actuator")
-    (jack,) = run_data.support_of(scenario, (), {"jack": record}).loads
+    (jack,) = run_data.support_of(Model(scenario), (), {"jack": record}).loads
     assert jack.values(np.array([0.15])) == pytest.approx(0.5 * (record["force"][1] + record["force"][2]))
-    assert run_data.support_of(scenario).loads == ()
+    assert run_data.support_of(Model(scenario)).loads == ()
 
 
 def test_what_cannot_be_drawn_is_told(golden: Golden) -> None:

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_to_toml
+from blocksim.scenario import Model, load_scenario, scenario_from_mapping, scenario_to_toml
 from blocksim.simulation.results import EventRecord
 from blocksim.simulation.trajectory import Frames, final_columns
 from blocksim.view import strip
@@ -107,7 +107,7 @@ def test_what_cannot_be_drawn_and_times_that_were_not_recorded_are_refused(golde
 
 def test_the_resolved_scenario_of_a_run_tells_all(tmp_path: Path) -> None:
     (tmp_path / "scenario.toml").write_text(scenario_to_toml(scenario_from_mapping(SCENE)), encoding="utf-8")
-    support = support_of(load_scenario(tmp_path / "scenario.toml"))
+    support = support_of(Model(load_scenario(tmp_path / "scenario.toml")))
     assert list(support.fixed) == [False, False, True]
     assert np.array(support.profile).tolist() == [[1, 0], [1, -1], [3, 0]]
     assert [(wall.x0, wall.y0, wall.x1, wall.y1) for wall in support.walls] == [(2, 2, 2, 3)]
@@ -121,8 +121,8 @@ def test_walls_go_at_the_time_of_an_event_and_at_rest_when_a_run_came_to_it() ->
     scenario = scenario_from_mapping({**SCENE, "walls": walls, "events": events})
     happened = EventRecord(event=0, step=15, time_s=1.5, what="", energy_J=0.0)
     times = (0.8, 1.0, 1.4, 1.5)
-    assert [len(support_of(scenario).at(time).walls) for time in times] == [2, 1, 1, 1]
-    assert [len(support_of(scenario, [happened]).at(time).walls) for time in times] == [2, 1, 1, 0]
+    assert [len(support_of(Model(scenario)).at(time).walls) for time in times] == [2, 1, 1, 1]
+    assert [len(support_of(Model(scenario), [happened]).at(time).walls) for time in times] == [2, 1, 1, 0]
 
 
 def test_heights_and_corners_of_a_profile() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import OutputError
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Model
 from blocksim.view import paints, style
 from blocksim.view.paints import PAINTS, by_speed, by_turn
 from blocksim.view.style import (
@@ -120,5 +120,5 @@ def test_blocks_that_never_move_have_colours_too(name: str) -> None:
     frames = toppling(5)
     for field in (frames.vx, frames.vy, frames.angle):
         field[:] = 0.0
-    fills = PAINTS[name](frames, load_scenario(SCENARIOS / "shaking_table.toml")).fills(0)
+    fills = PAINTS[name](frames, Model(SCENARIOS / "shaking_table.toml")).fills(0)
     assert all(len(fill) == 7 for fill in fills)

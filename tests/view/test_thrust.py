@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from blocksim import plot, replace, run
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Model, load_scenario
 from blocksim.simulation.results import Result
 from blocksim.view.mechanism import SLIDES, BracketRun, draw_mechanisms, joints
 from blocksim.view.run_data import support_of
@@ -73,7 +73,7 @@ def side(size: tuple[float, float], tilt: str, *, contacts: bool = True, **table
     result = run(scenario)
     assert result.summary.movement is not None
     moved = result.summary.movement.first_mover
-    return BracketRun(result.frames, support_of(scenario), moved, f"at {tilt}", is_mechanism=moved is not None)
+    return BracketRun(result.frames, support_of(Model(scenario)), moved, f"at {tilt}", is_mechanism=moved is not None)
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ def test_an_arch_placed_without_force_has_its_four_hinges() -> None:
     }
     scenario = load_scenario("scenarios/tilting_arch.toml", changes)
     frames = run(scenario).frames
-    fallen = BracketRun(frames, support_of(scenario), "2", "", is_mechanism=True)
+    fallen = BracketRun(frames, support_of(Model(scenario)), "2", "", is_mechanism=True)
     found = joints(frames, fallen.frame, fallen.support)
     assert not any(joint.slides for joint in found)
     hinges = sorted(np.concatenate([joint.hinges for joint in found]).tolist())

@@ -19,7 +19,7 @@ from blocksim.kernels.common.arrays import (
     zeros,
 )
 from blocksim.kernels.common.tolerances import CONE_TOLERANCE
-from blocksim.scenario import Scenario, place_segments, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, place_segments, scenario_from_mapping
 from blocksim.scenario.geometry import centre_outline, regular
 from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
 from blocksim.world import memory
@@ -64,12 +64,12 @@ def scene_of(
     }
     tables.setdefault("friction", {"block_block": FRICTION, "block_ground": FRICTION})
     scenario = scenario_of(bodies, contact=contact, time={"stop_at_rest": False, **(time or {})}, **tables)
-    return Simulation(build_world(scenario))
+    return Simulation(build_world(Model(scenario)))
 
 
 def slabs_of(**tables: Any) -> tuple[Records, tuple[Any, ...]]:
     scenario = scenario_of([{"y": 10.0}], **tables)
-    slabs: Any = build_world(scenario).bodies[1:-1]
+    slabs: Any = build_world(Model(scenario)).bodies[1:-1]
     return slabs, place_segments(scenario)
 
 
@@ -215,11 +215,13 @@ def test_members_of_a_stack_have_corners_of_their_own() -> None:
     wedges = [blocks_of(wedge={"outline": [[0.0, 0.0], [0.4, 0.0], [0.1, h]], "depth": 0.1}) for h in (0.2, 0.3)]
     hexagon = blocks_of(hexagon={"sides": 6, "radius": 0.2, "depth": 0.1})
     brick = blocks_of(brick={"width": 0.2, "height": 0.1, "length": 0.1})
-    stacks = [one for one in build_stacks([*wedges, hexagon, brick], NONSMOOTH) if isinstance(one, SceneStack)]
+    stacks = [
+        one for one in build_stacks([*map(Model, (*wedges, hexagon, brick))], NONSMOOTH) if isinstance(one, SceneStack)
+    ]
     assert [stack.numbers for stack in stacks] == [[0, 1], [2], [3]]
     assert stacks[-1].scenes.world.corners is None
     for m, wedge in enumerate(wedges):
-        alone = build_nonsmooth(wedge).world.corners
+        alone = build_nonsmooth(Model(wedge)).world.corners
         assert member(stacks[0].scenes, m).world.corners.tobytes() == alone.tobytes()
 
 
@@ -269,7 +271,7 @@ def test_scenes_are_the_arrays_that_were_read(golden: Golden) -> None:
     texts = []
     for name, scenario in SCENES.items():
         is_rigid = scenario.time.has_rigid_contacts
-        world = build_nonsmooth(scenario).world if is_rigid else build_world(scenario)
+        world = build_nonsmooth(Model(scenario)).world if is_rigid else build_world(Model(scenario))
         slots = [world.candidates.shape[1], world.contacts.shape[1], world.points.size] if world.contacts.size else []
         controls = world.controls[0]
         grid = f"{controls.cell_radius:.9g} m, cells of {controls.cell_width:.9g} m, large {world.large.tolist()}"
@@ -286,21 +288,21 @@ def scenario(body: Mapping[str, object] | None = None, *more: Mapping[str, objec
 
 
 def test_rest_is_looked_for_only_where_it_may_stop_the_run() -> None:
-    assert build_world(scenario(time={"stop_at_rest": False})).controls[0].rest_checks == 0
-    controls = build_world(scenario(time={"rest_hold": 0.02})).controls[0]
+    assert build_world(Model(scenario(time={"stop_at_rest": False}))).controls[0].rest_checks == 0
+    controls = build_world(Model(scenario(time={"rest_hold": 0.02}))).controls[0]
     held = controls.rest_checks * controls.check_every * controls.step
     assert 0.02 <= held < 0.0203
-    assert build_world(scenario(time={"rest_hold": 0.0})).controls[0].rest_checks == 1
+    assert build_world(Model(scenario(time={"rest_hold": 0.0}))).controls[0].rest_checks == 1
 
 
 @pytest.mark.parametrize("more", [0, GROUP - 2, GROUP - 1, 3 * GROUP])
 def test_every_group_of_bodies_has_a_tally_of_its_own(more: int) -> None:
-    world = build_world(scenario(None, *({**BODY, "x": 0.1 * i} for i in range(2, 2 + more))))
+    world = build_world(Model(scenario(None, *({**BODY, "x": 0.1 * i} for i in range(2, 2 + more)))))
     assert world.ledger.size > (world.bodies.size - 1) // GROUP
 
 
 def test_more_room_than_there_is_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = build_world(scenario())
+    world = build_world(Model(scenario()))
     monkeypatch.setattr(memory, "available_bytes", lambda: 1000)
     with pytest.raises(SceneTooLargeError):
         with_more_room(world)

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 from scipy.integrate import solve_ivp
 
 from blocksim.kernels.common.arrays import INTERACTION, Records
-from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, scenario_from_mapping
 from blocksim.world.interactions import (
     SMALLEST_RESTITUTION,
     ContactClass,
@@ -95,7 +95,7 @@ def test_parameters_of_all_pairs_are_those_that_were_read(golden: Golden) -> Non
 
 
 def classes(of: Scenario) -> tuple[ContactClass, ...]:
-    return contact_classes(of, place_bodies(of))
+    return contact_classes(of, Model(of).bodies)
 
 
 def table_of(of: Scenario) -> Records:

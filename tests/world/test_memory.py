@@ -8,7 +8,7 @@ import pytest
 
 from blocksim.errors import ExitCode
 from blocksim.kernels.common.arrays import World
-from blocksim.scenario import load_scenario, place_bodies
+from blocksim.scenario import Model, load_scenario
 from blocksim.world import memory
 from blocksim.world.build import build_world
 from blocksim.world.describe import describe
@@ -27,8 +27,8 @@ def size_of(world: World, bodies: int) -> Size:
 @pytest.mark.parametrize("model", ["surface", "kernel", "particles"])
 def test_the_estimate_is_that_of_the_arrays_of_a_world(model: str) -> None:
     scenario = load_scenario(SCENARIOS / "dominoes.toml", {"contact.model": model})
-    world = build_world(scenario)
-    bodies = len(place_bodies(scenario))
+    world = build_world(Model(scenario))
+    bodies = len(Model(scenario).bodies)
     arrays = sum(array.nbytes for array in world if isinstance(array, np.ndarray) and array is not world.particles)
     estimate = size_of(world, bodies).bytes - bodies * memory.OBJECT_BYTES
     assert arrays == pytest.approx(estimate, rel=0.1)
@@ -105,8 +105,8 @@ def test_a_system_without_proc_counts_free_pages(tmp_path: Path, monkeypatch: py
 
 def test_the_step_that_is_reported_is_the_one_that_is_taken() -> None:
     scenario = load_scenario(SCENARIOS / "three_blocks.toml")
-    told = describe(scenario)
-    assert told.step == build_world(scenario).controls[0].step
+    told = describe(Model(scenario))
+    assert told.step == build_world(Model(scenario)).controls[0].step
     assert told.steps * told.step == pytest.approx(scenario.time.end, abs=told.step)
 
 
@@ -115,7 +115,7 @@ def test_walls_of_their_own_material_are_pairs_too() -> None:
     oak = {"density": 700, "young_modulus": 11e9, "poisson_ratio": 0.3}
     values = {"materials.oak": oak, "walls": walls, "pairs.aluminium.oak.friction": 0.6}
     scenario = load_scenario(SCENARIOS / "slide.toml", values)
-    pairs = {pair.pair: pair for pair in describe(scenario).pairs}
+    pairs = {pair.pair: pair for pair in describe(Model(scenario)).pairs}
     assert list(pairs) == ["aluminium - ground", "aluminium - aluminium", "aluminium - wall of oak"]
     assert [pair.static_friction for pair in pairs.values()] == [0.38, 0.31, 0.6]
     assert pairs["aluminium - wall of oak"].rules["friction"] == "pairs.aluminium.oak.friction"
@@ -123,6 +123,6 @@ def test_walls_of_their_own_material_are_pairs_too() -> None:
 
 def test_frames_that_go_into_a_folder_take_no_memory() -> None:
     shipped = SCENARIOS / "tower.toml"
-    coarse, fine = (describe(load_scenario(shipped, [f"output.every={every}"])) for every in (0.01, 1e-5))
+    coarse, fine = (describe(Model(load_scenario(shipped, [f"output.every={every}"]))) for every in (0.01, 1e-5))
     assert fine.memory == coarse.memory
     assert 200e6 < coarse.memory < 220e6  # measured: 207 MB

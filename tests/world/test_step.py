@@ -12,7 +12,7 @@ from blocksim.bench.harness import pushed_wall, three_blocks
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common.arrays import AT_REST, REACHED, World
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, tangent_stiffness
-from blocksim.scenario import PlacedBody, Scenario
+from blocksim.scenario import Model, PlacedBody, Scenario
 from blocksim.scenario.laws import LAWS
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.bodies import layout_of
@@ -39,13 +39,13 @@ FALLING = {"y": 0.2, "angle": 0.4}
 
 
 def world_of(body: Mapping[str, object], *more: Mapping[str, object], **tables: Any) -> World:
-    return build_world(scenario_of([body, *more], **tables))
+    return build_world(Model(scenario_of([body, *more], **tables)))
 
 
 def load_of(*bodies: Mapping[str, object], **tables: Any) -> ContactLoad:
     scenario = scenario_of(bodies, **tables)
-    layout = layout_of(scenario)
-    (bounds,) = bounds_of([layout], build_world(scenario).bodies[np.newaxis])
+    layout = layout_of(Model(scenario))
+    (bounds,) = bounds_of([layout], build_world(Model(scenario)).bodies[np.newaxis])
     return expected_load(layout, bounds, speeds_of(layout, bounds))
 
 
@@ -71,8 +71,8 @@ def test_a_load_makes_a_light_block_no_faster_than_the_way_across_the_scene_lets
     speeds, blocks = list[float](), list[PlacedBody]()
     for end in (1e-6, 1.0, 10.0):
         scenario = scenario_of([{"y": HEIGHT / 2}], loads=loads, time={"end": end})
-        layout = layout_of(scenario)
-        (bounds,) = bounds_of([layout], build_world(scenario).bodies[np.newaxis])
+        layout = layout_of(Model(scenario))
+        (bounds,) = bounds_of([layout], build_world(Model(scenario)).bodies[np.newaxis])
         speeds.append(speeds_of(layout, bounds).greatest - speeds_of(layout, bounds).impact)
         blocks += layout.placed
     block = blocks[0]
@@ -283,10 +283,10 @@ def told(scenario: Scenario) -> str:
     """Return the step and the skin of a scene, and why, or why there is none."""
     is_rigid = scenario.time.scheme == "nonsmooth"
     try:
-        world = build_nonsmooth(scenario).world if is_rigid else build_world(scenario)
+        world = build_nonsmooth(Model(scenario)).world if is_rigid else build_world(Model(scenario))
     except BlocksimError as error:
         return f"{type(error).__name__} ({int(error.exit_code)}): {error}"
-    controls, why = world.controls[0], describe(scenario).rigid
+    controls, why = world.controls[0], describe(Model(scenario)).rigid
     return f"{controls.step:.9g} s, skin {controls.skin:.9g} m{f': {why.why}' if why else ''}"
 
 

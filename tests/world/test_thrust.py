@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from blocksim.scenario import Scenario, load_scenario, place_bodies, place_segments, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, load_scenario, place_segments, scenario_from_mapping
 from blocksim.simulation.rest_state import SettleError, settle
 from blocksim.simulation.run import simulate
-from blocksim.simulation.schemes import ALONE, build, build_scene
+from blocksim.simulation.schemes import ALONE, build
 from blocksim.verification.scene import HEIGHT, CaseScene, Simulation, scenario_of
 from blocksim.world.bodies import layout_of
 from blocksim.world.describe import describe
@@ -40,7 +40,7 @@ def ring_of(*structures: Mapping[str, object], **values: object) -> Scenario:
 
 def drawn_ring() -> list[dict[str, Any]]:
     """Return the cells of the same ring, block by block."""
-    placed = place_bodies(ring_of(RING))
+    placed = Model(ring_of(RING)).bodies
     return [{"outline": [[one.x + x, one.y + y] for x, y in one.corners], "fixed": one.fixed} for one in placed]
 
 
@@ -75,7 +75,7 @@ def test_tilted_column_stands_until_its_weight_leaves_the_base() -> None:
 
 
 def test_columns_and_walls_that_stand_upright_keep_their_step() -> None:
-    assert thrust_shift(layout_of(column(16))) == 0.0
+    assert thrust_shift(layout_of(Model(column(16)))) == 0.0
     assert own_step(load_scenario(SCENARIOS / "tilting_wall.toml")) == USUAL_STEP
     leaning = {"ground.tilt": "3 deg"}
     assert own_step(column(16, **leaning)) < 0.2 * own_step(column(16))
@@ -92,20 +92,20 @@ def test_constant_loads_lean_a_column_as_a_tilt_does() -> None:
 
 def test_what_nothing_carries_is_left_out_of_the_thrust_and_what_turns_freely_is_no_structure() -> None:
     stone = {"outline": [[0.0, 0.2], [0.02, 0.2], [0.0, 0.22]]}
-    assert thrust_shift(layout_of(as_cells(stone))) == pytest.approx(thrust_shift(layout_of(as_cells())))
+    assert thrust_shift(layout_of(Model(as_cells(stone)))) == pytest.approx(thrust_shift(layout_of(Model(as_cells()))))
     on_its_corner = [[0.0, 0.0], [0.1, 0.15], [0.0, 0.3], [-0.1, 0.15]]
     alone = {"kind": "polygons", "block": "voussoir", "cells": [{"outline": on_its_corner}]}
-    assert thrust_shift(layout_of(ring_of(alone))) == 0.0
+    assert thrust_shift(layout_of(Model(ring_of(alone)))) == 0.0
 
 
 def own_step(scenario: Scenario) -> float:
-    return float(build_nonsmooth(scenario).world.controls[0].step)
+    return float(build_nonsmooth(Model(scenario)).world.controls[0].step)
 
 
 def is_settled(scenario: Scenario) -> bool:
-    built = build(scenario)
+    model = Model(scenario)
     try:
-        settle(built.scene, scenario, built.placed, ALONE)
+        settle(build(model), model, ALONE)
     except SettleError:
         return False
     return True
@@ -122,7 +122,7 @@ def joints(*bodies: Mapping[str, Any], **tables: Any) -> list[ContactJoint]:
     """Return the joints of bricks, or of other bodies, the fixed ones supports."""
     rigid = {"time": {"scheme": "nonsmooth", "end": 1.0}, "friction": {"block_block": 0.6, "block_ground": 0.6}}
     scenario = scenario_of([BRICK | {**body} for body in bodies], **rigid, **tables)
-    placed = place_bodies(scenario)
+    placed = Model(scenario).bodies
     free = {i for i, body in enumerate(placed) if not body.fixed}
     level = scenario.ground.profile is None
     return joints_of(placed, place_segments(scenario), free, NEAR, level=level)
@@ -187,8 +187,8 @@ def cube_on_two() -> Scenario:
     ],
 )
 def test_heavy_blocks_sink_into_light_ones_by_what_is_reported(scenario: Scenario, is_warned: bool) -> None:
-    told = describe(scenario).rigid
-    run = Simulation(build_scene(scenario))
+    told = describe(Model(scenario)).rigid
+    run = Simulation(build(Model(scenario)))
     heavy = len(run.bodies) - 1
     before = float(run.bodies.y[heavy])
     sunk = before - float(run.to_time(2.0).bodies.y[heavy])
@@ -203,7 +203,7 @@ def test_automatic_step_holds_a_heavy_block_beside_the_middle_of_a_light_one_to_
     ratio: float,
 ) -> None:
     scenario = heavy_on_light(ratio, x=0.008, step="auto")
-    told, result = describe(scenario).rigid, simulate(scenario)
+    told, result = describe(Model(scenario)).rigid, simulate(scenario)
     assert told is not None
     assert (told.warning, "light blocks carry heavy ones" in told.why) == ("", ratio > 100.0)
     frames = result.held
@@ -223,5 +223,5 @@ def test_a_run_warns_of_a_heavy_block_that_has_come_to_lie_on_a_light_one(ratio:
 
 
 def test_a_block_so_far_away_that_its_corners_are_one_place_halves_its_load() -> None:
-    placed = place_bodies(CaseScene([{"x": 1e16, "y": 0.5 * HEIGHT}]).scenario())
+    placed = Model(CaseScene([{"x": 1e16, "y": 0.5 * HEIGHT}]).scenario()).bodies
     assert [load.force for load in loads_at_rest(placed, 2.0 / placed[0].mass)] == pytest.approx([1.0, 1.0])

@@ -1,6 +1,6 @@
 """Common base of all tables of a scenario, of those of further systems, and field types that are not quantities."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_args
@@ -14,6 +14,7 @@ from blocksim.scenario import input_files, spelling, units
 
 if TYPE_CHECKING:
     from blocksim.scenario.models.scenario import Scenario
+    from blocksim.scenario.placement import PlacedBody
 
 
 class Table(pydantic.BaseModel):
@@ -167,7 +168,11 @@ class SystemTable(Table):
 
     declared_in: ClassVar[str]  # module:name of its blocksim.world.systems.system.System
 
-    def impossible(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:  # noqa: ARG002 - for those of systems
+    def impossible(
+        self,
+        scenario: "Scenario",  # noqa: ARG002 - for those of systems
+        placed: "Sequence[PlacedBody]",  # noqa: ARG002
+    ) -> Iterator[tuple[str, str]]:
         """Yield keys and what is wrong with them, although every value is valid by itself."""
         yield from ()
 

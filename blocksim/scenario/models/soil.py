@@ -1,7 +1,7 @@
 """[[soils]]: bodies of soil, filled with particles of one spacing."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import numpy as np
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from blocksim.scenario.models.scenario import Scenario
+    from blocksim.scenario.placement import PlacedBody
 
 Kind = Literal["outline", "rectangle", "slope", "fill"]
 Start = Literal["geostatic", "ramp"]
@@ -98,16 +99,16 @@ class SoilTable(SystemTable):
         back = 0.0 if self.angle is None else (y1 - y0) / math.tan(self.angle)
         return max(back, 0.0), max(-back, 0.0)
 
-    def impossible(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:
+    def impossible(self, scenario: "Scenario", placed: "Sequence[PlacedBody]") -> Iterator[tuple[str, str]]:
         """Find a material that is no soil, a spacing that does not suit, and what the outline meets."""
-        from blocksim.scenario import placement, start  # noqa: PLC0415 - they need the scenario's own model
+        from blocksim.scenario import start  # noqa: PLC0415 - it needs the scenario's own model
 
         if self.material not in scenario.materials:
             hint = spelling.did_you_mean_or_list(self.material, scenario.materials)
             yield "material", f"unknown material {q.toml(self.material)}, {hint}"
         elif scenario.materials[self.material].friction_angle is None:
             yield "material", f"{q.toml(self.material)} is no soil; give this material a friction_angle"
-        thinnest = min(placement.place_bodies(scenario), key=lambda body: body.least_width, default=None)
+        thinnest = min(placed, key=lambda body: body.least_width, default=None)
         across = geometry.count_across(self.corners, self.spacing)
         first = scenario.systems["soils"][0]
         unfit = []
@@ -123,7 +124,7 @@ class SoilTable(SystemTable):
             unfit.append(f"{across[0] * across[1]} particles are too many; at most {MOST_PARTICLES} are allowed")
         yield from (("spacing", message) for message in unfit)
         if not unfit:
-            yield from start.meetings(self, "outline" if self.kind == "outline" else "kind", scenario)
+            yield from start.meetings(self, "outline" if self.kind == "outline" else "kind", scenario, placed)
 
 
 SYSTEMS["soils"] = SoilTable

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import TracebackType
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from blocksim.errors import BlocksimError, InvalidInputError, OutputError
 from blocksim.kernels.common import arrays, compiler, jit, systems
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.options import silent
-from blocksim.scenario import Scenario, motion, overlap, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, motion, overlap
 from blocksim.scenario.models.timeline import SCHEMES as TABLES
 from blocksim.scenario.structures.base import PolygonStructure
 from blocksim.simulation import trajectory
@@ -146,8 +146,8 @@ class Scheme:
     overlaps: Callable[[Any], Overlaps] = lambda _: NO_OVERLAPS  # of a scene that an overlap has ended
     lost_contact: Callable[[Any, Overlaps], str] = lambda *_: ""
     # why it has ended, where not by contact.max_overlap
-    convergence: Callable[[Any], Mapping[str, float] | None] = lambda _: None
-    # how well its equations were solved so far: entries of results.ImpulseConvergence
+    convergence: Callable[..., Mapping[str, float] | None] = lambda *_: None
+    # how well the equations of a scene, or of a member of a stack, were solved so far: results.ImpulseConvergence
     warning: Callable[[Any, float, float], str] = lambda *_: ""
     # of contacts in a scene that has finished, given the largest overlap and the smallest side of a block (m)
 
@@ -186,43 +186,37 @@ def scheme_of(scene: AnyScene | systems.Coupled) -> Scheme:
     return KNOWN[type(scene)]
 
 
-def build_scene(scenario: Scenario) -> AnyScene:
+def build(model: Model) -> AnyScene:
     """Return the scene of a scenario at time zero. Raises what the scheme raises for a scenario that it cannot run."""
-    scene: AnyScene = build(scenario).scene
-    return scene
+    scene: AnyScene = scenes.build_one(model, SCHEMES[model.scenario.time.scheme].construction)
+    others = others_of(model)
+    return cast("AnyScene", scenes.couple(model, scene, others)) if others else scene
 
 
-def build(scenario: Scenario) -> scenes.InitialScene:
-    """Return the same scene with the blocks as they were placed."""
-    built = scenes.build_one(scenario, SCHEMES[scenario.time.scheme].construction)
-    others = others_of(scenario)
-    return built._replace(scene=scenes.couple(scenario, built.scene, others)) if others else built
-
-
-def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[scenes.SceneStack | scenes.Refusal]:
+def build_stacks(models: Sequence[Model]) -> Iterator[scenes.SceneStack | scenes.Refusal]:
     """Build the scenes of scenarios at time zero, those of one scheme and shape together.
 
     A scene with systems beside blocks and supports, one of a scheme without a way to advance members together, and one
     with events or that settles before it begins, is a stack of its own.
     """
     keys: list[str | None] = []
-    for scenario in scenarios:
+    for scenario in (model.scenario for model in models):
         scheme = SCHEMES[scenario.time.scheme]
         is_alone = scenario.systems or scenario.events or scheme.advance_members is None or motion.settles(scenario)
         keys.append(None if is_alone else scheme.name)
     for places in scenes.group_equal(keys):
         key = keys[places[0]]
         if key is not None:
-            some = [scenarios[i] for i in places]
+            some = [models[i] for i in places]
             yield from scenes.build_stacks(some, SCHEMES[key].construction, places)
             continue
         for i in places:
             try:
-                built = build(scenarios[i])
+                scene = build(models[i])
             except BlocksimError as error:
                 yield scenes.Refusal(i, error)
             else:
-                yield scenes.SceneStack([i], [built.placed], scenes.stack_of_one(built.scene))
+                yield scenes.SceneStack([i], scenes.stack_of_one(scene))
 
 
 def ledger_names(scene: AnyScene | systems.Coupled) -> tuple[str, ...]:
@@ -363,7 +357,7 @@ def compile_kernels(kernels: str = DEFAULT) -> float:
                 for scheme in SCHEMES.values()
                 if kernels in (*scheme.kernel_sets, scheme.kernels(""))
             )
-            scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **changes})), 0)
+            scene, _ = ALONE.advance(build(Model({**SMALLEST_SCENE, **changes})), 0)
             measure_row(scene)
             if kernels != DEFAULT:
                 jit.mark(kernels)

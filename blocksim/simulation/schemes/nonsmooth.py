@@ -127,9 +127,9 @@ def late_contact(scene: arrays.Nonsmooth, overlaps: schemes.Overlaps) -> str:
     )
 
 
-def convergence(scene: arrays.Nonsmooth) -> dict[str, float]:
-    """Return how well impulses were found so far."""
-    stepping = scene.contacts.stepping[0]
+def convergence(scene: arrays.Nonsmooth, member: int = 0) -> dict[str, float]:
+    """Return how well impulses were found so far in a scene, or in a member of a stack."""
+    stepping = scene.contacts.stepping.reshape(-1)[member]
     return {name: stepping[entry].item() for name, entry in CONVERGENCE.items()}
 
 

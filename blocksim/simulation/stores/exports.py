@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
-from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.scenario import Model, PlacedBody
 from blocksim.scenario.structures.drawings import DXF, DXF_APPLICATION, DXF_INTEGER, DXF_TEXT
 from blocksim.simulation import files, instruments
 from blocksim.simulation.trajectory import BODIES, UNITS, Contacts, Frames, forces_on_a, join_contacts
@@ -78,7 +78,7 @@ MOST_LETTERS = 60  # of a name, 4 bytes each at most: extended data have 255
 METRES = 6  # DXF's number of the unit
 
 
-def write_geojson(path: Path, frames: Frames, scenario: Scenario) -> int:
+def write_geojson(path: Path, frames: Frames, model: Model) -> int:
     """Write the outlines (m) of the last frame and return the number of blocks; properties are block, fixed and name.
 
     Raises InvalidInputError when there is no block to write, and OutputError.
@@ -94,21 +94,21 @@ def write_geojson(path: Path, frames: Frames, scenario: Scenario) -> int:
             },
             "geometry": {"type": "Polygon", "coordinates": [[*corners.tolist(), corners[0].tolist()]]},
         }
-        for corners, body, rotation in _last_blocks(frames, scenario)
+        for corners, body, rotation in _last_blocks(frames, model)
     ]
     lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
     files.write_text(path, f'{{{files.GEOJSON_MARK}, "type": "FeatureCollection", "features": [\n{lines}\n]}}\n')
     return len(features)
 
 
-def write_dxf(path: Path, frames: Frames, scenario: Scenario) -> int:
+def write_dxf(path: Path, frames: Frames, model: Model) -> int:
     """Write the outlines (m) of the last frame, each in the layer of its block, and return the number of blocks.
 
     Extended data of BLOCKSIM have the name of each and whether it is fixed; `read_drawing` takes them up again.
     Raises UnavailableError without the package for it, else as `write_geojson`.
     """
     ezdxf = load_module("ezdxf", f"writing {path.name}", DXF)
-    blocks = [*_last_blocks(frames, scenario)]
+    blocks = [*_last_blocks(frames, model)]
     document = ezdxf.new("R2010", units=METRES)
     document.header.custom_vars.append(*files.DXF_PROPERTY)
     document.appids.new(DXF_APPLICATION)
@@ -123,7 +123,7 @@ def write_dxf(path: Path, frames: Frames, scenario: Scenario) -> int:
     return len(blocks)
 
 
-def _last_blocks(frames: Frames, scenario: Scenario) -> Iterator[tuple[Floats, PlacedBody, float]]:
+def _last_blocks(frames: Frames, model: Model) -> Iterator[tuple[Floats, PlacedBody, float]]:
     """Yield the blocks of the last frame in which all of them are somewhere, without those that were removed.
 
     Each with its corners (m, (k, 2)), how it was placed, and its rotation (rad) since the start.
@@ -135,7 +135,7 @@ def _last_blocks(frames: Frames, scenario: Scenario) -> Iterator[tuple[Floats, P
         raise InvalidInputError("no block to export")
     last = int(np.flatnonzero(somewhere)[-1])
     places = placed_points(frames.corners, frames.x[last], frames.y[last], frames.angle[last])
-    for number, body in enumerate(place_bodies(scenario)):
+    for number, body in enumerate(model.bodies):
         if not are_removed(frames.vx[last, number]):
             corners = places[number, : len(distinct(frames.corners[number]))]
             yield corners, body, float(frames.rotation[last, number])
@@ -151,7 +151,7 @@ WAY_DATA = "displacement_m"  # from the first frame
 Indices = NDArray[np.intp]
 
 
-def write_vtkhdf(path: Path, frames: Frames, scenario: Scenario) -> int:
+def write_vtkhdf(path: Path, frames: Frames, model: Model) -> int:
     """Write all frames in which every number is finite and return their number.
 
     Points in m, z = 0. Cells are the outlines of all systems, blocks first; all others have block number 0, ground and
@@ -160,7 +160,7 @@ def write_vtkhdf(path: Path, frames: Frames, scenario: Scenario) -> int:
     OutputError. The file is made in memory, packed: HDF5 does not survive a disk that is full.
     """
     chosen = _finite(frames)
-    tracks = (*frames.tracks, supports_track(scenario, frames.tracks[0], frames.time))
+    tracks = (*frames.tracks, supports_track(model, frames.tracks[0], frames.time))
     corners = np.concatenate([_corners_of(one) for one in tracks])
     cells, points, blocks, count = len(corners), int(corners.sum()), len(frames.names), len(chosen)
     others = (one for track in tracks for one in track.system.outputs if one.name not in (*PLACE, *VELOCITY))
@@ -296,7 +296,7 @@ def _cell_data(track: Track, name: str, some: Indices) -> Floats:
 class Format(NamedTuple):
     """How a format is written; both writers return the number of frames, blocks or contacts in it."""
 
-    write: Callable[[Path, Frames, Scenario], int]
+    write: Callable[[Path, Frames, Model], int]
     write_contacts: Callable[[Path, Frames, Contacts], int] | None = None  # into a file of their own
     counted: str = "frames"
 

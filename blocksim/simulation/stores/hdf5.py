@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError, OutputError
-from blocksim.scenario import Scenario, events, input_files, place_bodies
+from blocksim.scenario import Model, input_files
 from blocksim.simulation import files, instruments, trajectory
 from blocksim.world.free_memory import available_bytes, chunk_rows, readable
 from blocksim.world.systems import blocks, others_of
@@ -271,12 +271,12 @@ def refuse_too_many(path: Path, sets: dict[str, Any], rows: int, what: str = "fr
         )
 
 
-def read_probes(path: Path, scenario: Scenario) -> dict[str, instruments.ProbeSeries]:
+def read_probes(path: Path, model: Model) -> dict[str, instruments.ProbeSeries]:
     """Return the samples of all probes of a scenario in a run file, by name.
 
     Raises InputMissingError, or InvalidInputError for a damaged file or one without these probes.
     """
-    names = [*events.probes_of(scenario)]
+    names = [*model.probes]
     if not names:
         return {}
     with open_hdf5(path) as file, refuse_damage(path, "its probes cannot be read"):
@@ -299,12 +299,12 @@ def _samples(path: Path, file: Any, name: str) -> instruments.ProbeSeries:
     return instruments.ProbeSeries(name, kind, steps, times, columns, units)
 
 
-def read_frames(path: Path, scenario: Scenario) -> trajectory.Frames:
-    """Return the committed frames of a run file; `scenario` is the one that lies beside it.
+def read_frames(path: Path, model: Model) -> trajectory.Frames:
+    """Return the committed frames of a run file; `model` is that of the scenario that lies beside it.
 
     Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty.
     """
-    systems = (blocks.block_system(place_bodies(scenario)), *others_of(scenario))
+    systems = (blocks.block_system(model.bodies), *others_of(model))
     time_step, rows = read_rows(path, systems)
     return instruments.frames_from_rows(systems, time_step, rows)
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 
 from blocksim.errors import InvalidInputError
 from blocksim.options import Option, silent
-from blocksim.scenario import Scenario, spelling
+from blocksim.scenario import Model, spelling
 from blocksim.study.rows import Row
 
 SECONDS = 0.5  # of work in a batch
@@ -35,7 +35,7 @@ class Task(NamedTuple):
     number: int
     name: str
     settings: dict[str, object]
-    scenario: Scenario
+    model: Model
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class BatchSize:
 
 
 def take(tasks: Iterator[Task], count: int, is_stopped: Callable[[], bool]) -> tuple[Task, ...]:
-    """Take up to `count` tasks; their scenarios are made now, so it gives up after a batch's time or when stopped."""
+    """Take up to `count` tasks; their models are made now, so it gives up after a batch's time or when stopped."""
     latest = time.monotonic() + SECONDS
     numbers = takewhile(lambda _: not is_stopped() and time.monotonic() < latest, range(count))
     return tuple(task for _, task in zip(numbers, tasks, strict=False))

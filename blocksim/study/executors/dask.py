@@ -117,8 +117,8 @@ class Submission:
             tasks = self.again.popleft() if self.again else take(self.tasks, self.size.count, self.setting.is_stopped)
             if not tasks:
                 return
-            scenarios, peaks = [task.scenario for task in tasks], self.setting.peaks
-            future = self.client.submit(ensemble.run_batch, scenarios, (), code_hash(), peaks=peaks, pure=False)
+            models, peaks = [task.model for task in tasks], self.setting.peaks
+            future = self.client.submit(ensemble.run_batch, models, (), code_hash(), peaks=peaks, pure=False)
             self._await(future, tasks)
 
     def _await(self, future: Any, tasks: tuple[Task, ...]) -> None:

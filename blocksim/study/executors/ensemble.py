@@ -16,7 +16,7 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
-from blocksim.scenario import Document, Scenario
+from blocksim.scenario import Document, Model
 from blocksim.simulation import MemberFailure, Summary, files, provenance, results, run_in_batches, trajectory
 from blocksim.study.executors import Batch, BatchSize, RunSetting, Task, take
 from blocksim.study.rows import FINISHED, Row, row_of, row_of_error
@@ -53,26 +53,26 @@ for_rounds = partial(nullcontext, run_tasks)
 
 def _run(tasks: tuple[Task, ...], setting: RunSetting, ended: SimpleQueue[Batch]) -> None:
     began = time.perf_counter()
-    rows = rows_of([task.scenario for task in tasks], setting.jobs, peaks=setting.peaks)
+    rows = rows_of([task.model for task in tasks], setting.jobs, peaks=setting.peaks)
     ended.put(Batch(tasks, tuple(rows), time.perf_counter() - began, platform.node()))
 
 
-def rows_of(scenarios: Sequence[Scenario], threads: int, *, peaks: bool = False) -> list[Row]:
-    """Return the row of every scenario; one that ends in an error of ours fails alone, found by halving."""
-    if not scenarios:
+def rows_of(models: Sequence[Model], threads: int, *, peaks: bool = False) -> list[Row]:
+    """Return the row of every model; one that ends in an error of ours fails alone, found by halving."""
+    if not models:
         return []
     try:
         return [
             row_of_error(end.error)
             if isinstance(end, MemberFailure)
             else row_of(end.outcome, end.seconds, end.observables, end.columns)
-            for end in chain(*run_in_batches(scenarios, threads=threads, peaks=peaks))
+            for end in chain(*run_in_batches(models, threads=threads, peaks=peaks))
         ]
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
-        if len(scenarios) == 1:
+        if len(models) == 1:
             return [row_of_error(error)]
-    middle = len(scenarios) // 2
-    return rows_of(scenarios[:middle], threads, peaks=peaks) + rows_of(scenarios[middle:], threads, peaks=peaks)
+    middle = len(models) // 2
+    return rows_of(models[:middle], threads, peaks=peaks) + rows_of(models[middle:], threads, peaks=peaks)
 
 
 @dataclass(frozen=True)
@@ -89,15 +89,15 @@ def run_members(document: Document, values: Iterable[Mapping[str, object]]) -> I
     A member whose values do not go together, or whose run fails, has a problem instead of a final table; the others do
     not depend on it.
     """
-    rest = iter(values)
+    rest, base = iter(values), Model(document.without_sweep())
     while batch := list(islice(rest, BATCH)):
-        built: list[Scenario | Member] = []
+        built: list[Model | Member] = []
         for one in batch:
             try:
-                built.append(document.with_values(one).build().model_copy(update={"sweep": None}))
+                built.append(base.varied(one))
             except BlocksimError as error:
                 built.append(Member(None, str(error).splitlines()[0]))
-        ends = chain(*run_in_batches([one for one in built if isinstance(one, Scenario)]))
+        ends = chain(*run_in_batches([one for one in built if isinstance(one, Model)]))
         for member in built:
             if isinstance(member, Member):
                 yield member
@@ -107,7 +107,7 @@ def run_members(document: Document, values: Iterable[Mapping[str, object]]) -> I
                 yield Member(end.columns)
 
 
-def run_case(scenario: Scenario, folder: Path) -> Row:
+def run_case(model: Model, folder: Path) -> Row:
     """Run one case into its folder, or what is left of it, unless it is there already, and return its row."""
     try:
         with suppress(BlocksimError):
@@ -116,14 +116,14 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
             has_ended = (folder / files.DONE).is_file() if summary.status == FINISHED else summary.status != INTERRUPTED
             if (
                 has_ended
-                and summary.run == provenance.run_hash(scenario)
+                and summary.run == provenance.run_hash(model)
                 and not results.changed_files(folder, summary, results.RESULT_FILES)
             ):
                 return _row_of(summary, trajectory.read_table(folder / files.FINAL))
         try:
-            result = run(scenario, out=folder, resume=True)
+            result = run(model, out=folder, resume=True)
         except (InvalidInputError, InputMissingError, OutputExistsError):  # it cannot be taken up, or there was none
-            result = run(scenario, out=folder, overwrite=True)
+            result = run(model, out=folder, overwrite=True)
         return _row_of(result.summary, result.columns)
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         return row_of_error(error)
@@ -134,11 +134,11 @@ def _row_of(summary: Summary, final: trajectory.Columns) -> Row:
     return row_of(summary, summary.simulated_time_s, {} if moved is None else moved.row, final)
 
 
-BatchResult = tuple[tuple[Row, ...], float, str]  # rows in the order of the scenarios, wall time (s), machine
+BatchResult = tuple[tuple[Row, ...], float, str]  # rows in the order of the models, wall time (s), machine
 
 
-def run_batch(scenarios: Sequence[Scenario], folders: Sequence[Path], code: str, *, peaks: bool = False) -> BatchResult:
-    """Run scenarios on one thread, into folders where these are given, by the same code as whoever asks.
+def run_batch(models: Sequence[Model], folders: Sequence[Path], code: str, *, peaks: bool = False) -> BatchResult:
+    """Run models on one thread, into folders where these are given, by the same code as whoever asks.
 
     Raises InvalidInputError where it is another.
     """
@@ -148,9 +148,9 @@ def run_batch(scenarios: Sequence[Scenario], folders: Sequence[Path], code: str,
         raise InvalidInputError(f"the worker on {platform.node()} {versions}; install the same one")
     began = time.perf_counter()
     rows: list[Row] = []
-    for scenario, folder in zip(scenarios, folders, strict=False):
-        rows.append(run_case(scenario, folder))
+    for model, folder in zip(models, folders, strict=False):
+        rows.append(run_case(model, folder))
         if rows[-1]["status"] == INTERRUPTED:  # somebody has ended this process: no end of the case
             raise KeyboardInterrupt
-    rows = rows or rows_of(scenarios, 1, peaks=peaks)
+    rows = rows or rows_of(models, 1, peaks=peaks)
     return tuple(rows), time.perf_counter() - began, platform.node()

@@ -156,7 +156,7 @@ def run_here(tasks: Iterable[Task], setting: RunSetting) -> Generator[Batch, Non
     """Run tasks one after the other in this process, as a worker does. Raises KeyboardInterrupt on Ctrl-C."""
     for task in tasks:
         folders = [] if setting.folder is None else [setting.folder / task.name]
-        yield Batch((task,), *ensemble.run_batch([task.scenario], folders, provenance.code_hash(), peaks=setting.peaks))
+        yield Batch((task,), *ensemble.run_batch([task.model], folders, provenance.code_hash(), peaks=setting.peaks))
 
 
 class Work:
@@ -175,10 +175,10 @@ class Work:
         peaks, place, code = self.setting.peaks, self.setting.folder, provenance.code_hash()
         while True:
             while (job := self._next()) is not None:
-                scenarios = [task.scenario for task in job.tasks]
+                models = [task.model for task in job.tasks]
                 folders = [] if place is None else [place / task.name for task in job.tasks]
                 try:
-                    self.pending[pool.submit(ensemble.run_batch, scenarios, folders, code, peaks=peaks)] = job
+                    self.pending[pool.submit(ensemble.run_batch, models, folders, code, peaks=peaks)] = job
                 except BrokenProcessPool:  # it died before it got the job
                     self.suspects.append(job)
                     raise

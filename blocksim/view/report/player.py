@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import Scenario
+from blocksim.scenario import Model, Scenario
 from blocksim.simulation import results, trajectory
 from blocksim.view import arrows, paints, run_data, scene, style
 from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices
@@ -124,7 +124,7 @@ MOST_ARROWS = 200_000  # in all frames of a run
 
 def pack_loads(
     frames: trajectory.Frames,
-    scenario: Scenario,
+    model: Model,
     kept: Indices,
     happened: Sequence[results.EventRecord],
     probes: "Mapping[str, ProbeSeries]",
@@ -133,7 +133,7 @@ def pack_loads(
 
     The support's displacement is told beside loads on all blocks, as level ground looks the same wherever it is.
     """
-    support = run_data.support_of(scenario, happened, probes)
+    support = run_data.support_of(model, happened, probes)
     acts, extent = arrows.actions_on(frames, kept, support), run_data.extent_of(frames, kept, support)
     room, length = arrows.with_room(extent, acts)
     marks = [[[mark.text, *mark.way] for mark in row] for row in acts.marks]
@@ -235,18 +235,20 @@ def pack_forces(frames: trajectory.Frames, kept: Indices, tilt: float) -> dict[s
 
 
 def scene_data(
-    frames: trajectory.Frames, scenario: Scenario, kept: Indices, happened: Sequence[results.EventRecord] = ()
+    frames: trajectory.Frames, model: Model, kept: Indices, happened: Sequence[results.EventRecord] = ()
 ) -> dict[str, Any]:
     """Return everything but the frames that the player needs, as plain values for JSON.
 
     `gone` and `walls_gone` say from which of the kept frames on a block or wall is not there any more, None for never.
     """
-    support = run_data.support_of(scenario, happened)
+    support = run_data.support_of(model, happened)
     extent = run_data.extent_of(frames, kept, support)
     reach = ENDLESS_WIDTHS * (extent.width + extent.height) / MILLIMETRES
     sides = np.stack([frames.size_x, frames.size_y], axis=-1)
     kinds, which = np.unique(sides, axis=0, return_inverse=True)
-    particles = [(MILLIMETRES * boundary_particles(scenario, *map(float, kind))).round(4).tolist() for kind in kinds]
+    particles = [
+        (MILLIMETRES * boundary_particles(model.scenario, *map(float, kind))).round(4).tolist() for kind in kinds
+    ]
     return {
         "extent": [extent.left, extent.right, extent.bottom, extent.top],
         "tilt": support.tilt,

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario, document, input_files, load_stored
+from blocksim.scenario import Model, Scenario, document, input_files
 from blocksim.simulation import files, instruments, observables, results as result, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
 from blocksim.view import history, kinds, run_data, scene, style, time_panels
@@ -78,7 +78,7 @@ class PartialRun:
     """
 
     folder: Path
-    scenario: Scenario | None
+    model: Model | None
     scenario_text: str | None
     summary: result.Summary | None
     frames: trajectory.Frames | None
@@ -90,8 +90,8 @@ class PartialRun:
     @property
     def name(self) -> str:
         """The scenario's name; that of the folder where it is not known."""
-        if self.scenario is not None:
-            return self.scenario.name
+        if self.model is not None:
+            return self.model.scenario.name
         return self.folder.name if self.summary is None else self.summary.name
 
     @property
@@ -115,19 +115,19 @@ def read_folder(folder: Path) -> PartialRun:
                 damage.append(str(error))
             return None
 
-    scenario = attempt(lambda: load_stored(folder / files.SCENARIO))
+    model = attempt(lambda: Model.stored(folder / files.SCENARIO))
     summary = attempt(lambda: result.read_summary(folder / files.SUMMARY))
-    frames = None if scenario is None else attempt(lambda: read_frames(folder / files.FRAMES, scenario))
+    frames = None if model is None else attempt(lambda: read_frames(folder / files.FRAMES, model))
     final = attempt(lambda: trajectory.read_table(folder / files.FINAL))
-    if scenario is None and summary is None and final is None:
+    if model is None and summary is None and final is None:
         raise InvalidInputError("\n".join([f"{folder}: nothing of this run can be read", *problems]))
     probes = None
-    if scenario is not None and frames is not None:
-        probes = attempt(lambda: read_probes(folder / files.FRAMES, scenario))
+    if model is not None and frames is not None:
+        probes = attempt(lambda: read_probes(folder / files.FRAMES, model))
     text = None
     with suppress(BlocksimError):
         text = input_files.read_limited(folder / files.SCENARIO, document.MAX_BYTES).decode(errors="replace")
-    return PartialRun(folder, scenario, text, summary, frames, final, tuple(problems), tuple(damage), probes or {})
+    return PartialRun(folder, model, text, summary, frames, final, tuple(problems), tuple(damage), probes or {})
 
 
 MOST_MAPS = 6  # of a sweep, each over two of its inputs
@@ -245,8 +245,8 @@ def run_subject(
         "summary": _summary(run),
         "problems": [local_text(text) for text in (*run.problems, *problems, *remarks)],
         "scenario": run.scenario_text,
-        "values": None if run.scenario is None else run.scenario.model_dump(by_alias=True, exclude={"sweep"}),
-        "description": None if run.scenario is None else run.scenario.description,
+        "values": None if run.model is None else run.model.scenario.model_dump(by_alias=True, exclude={"sweep"}),
+        "description": None if run.model is None else run.model.scenario.description,
         "notes": notes,
         "final": [] if run.final is None else trajectory.rows_of(run.final),
         "comparison": comparison,
@@ -269,16 +269,16 @@ def _player_data(
     run: PartialRun, comparison: Mapping[str, Any] | None, most_bytes: int
 ) -> tuple[dict[str, Any] | None, list[str], list[str], str | None]:
     """Return frames and scene for the player, notes on them, problems with them, and the histories as a picture."""
-    frames, scenario = run.frames, run.scenario
-    if frames is None or scenario is None:
+    frames, model = run.frames, run.model
+    if frames is None or model is None:
         return None, [], [], None
     try:
         data, kept, notes = pack_frames(frames, most_bytes)
     except InvalidInputError as error:
         return None, [], [str(error)], None
     happened = () if run.summary is None else run.summary.events
-    drawn = scene_data(frames, scenario, kept, happened)
-    forces, found = pack_forces(frames, kept, drawn["tilt"]), pack_loads(frames, scenario, kept, happened, run.probes)
+    drawn = scene_data(frames, model, kept, happened)
+    forces, found = pack_forces(frames, kept, drawn["tilt"]), pack_loads(frames, model, kept, happened, run.probes)
     notes, loads = [*notes, NO_FORCES if forces is None else forces["told"]], None
     if found is not None:
         loads, extent, more = found
@@ -294,7 +294,7 @@ def _player_data(
     address = None
     if data["names"]:
         repeats = [SimpleNamespace(**row) for row in rows if row["mean"] is not None]
-        support = run_data.support_of(scenario, happened)
+        support = run_data.support_of(model, happened)
         address, data["histories"] = history_of(frames, support, repeats if comparison else None)
     return data, notes, [], address
 

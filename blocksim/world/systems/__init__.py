@@ -9,8 +9,9 @@ from importlib import import_module
 from typing import Any
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Scenario
+from blocksim.scenario import Model, derived
 from blocksim.scenario.models.base import SYSTEMS
+from blocksim.scenario.placement import GEOMETRY
 from blocksim.world.systems.blocks import BLOCKS, SUPPORTS
 from blocksim.world.systems.soils import SOILS, soil_kernels
 from blocksim.world.systems.system import System, SystemInScene
@@ -31,28 +32,29 @@ Contacts of blocks and supports with one another are stages of each scheme.
 """
 
 
-def systems_of(scenario: Scenario) -> tuple[System, ...]:
+def systems_of(model: Model) -> tuple[System, ...]:
     """Return what the systems beside blocks and supports declare, in the order in which they are registered."""
-    places = [table.declared_in.split(":") for name, table in SYSTEMS.items() if scenario.systems.get(name)]
+    places = [table.declared_in.split(":") for name, table in SYSTEMS.items() if model.scenario.systems.get(name)]
     return tuple(getattr(import_module(module), declared) for module, declared in places)
 
 
-def others_of(scenario: Scenario) -> tuple[SystemInScene, ...]:
+@derived(*GEOMETRY, "gravity")
+def others_of(model: Model) -> tuple[SystemInScene, ...]:
     """Return the systems of a scenario beside blocks and supports, in the order in which they are registered."""
-    return tuple(SystemInScene(system, system.elements(scenario)) for system in systems_of(scenario))
+    return tuple(SystemInScene(system, system.elements(model)) for system in systems_of(model))
 
 
-def largest_step(scenario: Scenario) -> float:
+def largest_step(model: Model) -> float:
     """Return the longest step (s) that the systems beside blocks and supports admit; infinite where there are none."""
-    bounds = (present.system.largest_step for present in others_of(scenario))
-    return min((bound(scenario) for bound in bounds if bound is not None), default=float("inf"))
+    bounds = (system.largest_step for system in systems_of(model))
+    return min((bound(model) for bound in bounds if bound is not None), default=float("inf"))
 
 
-def warnings_of(scenario: Scenario) -> Iterator[str]:
+def warnings_of(model: Model) -> Iterator[str]:
     """Yield what is known to be off in the results of the systems beside blocks and supports."""
-    for system in systems_of(scenario):
+    for system in systems_of(model):
         if system.warnings is not None:
-            yield from system.warnings(scenario)
+            yield from system.warnings(model)
 
 
 def acts_of(systems: Sequence[System]) -> Iterator[tuple[int, int | None, Any]]:

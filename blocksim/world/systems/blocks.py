@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import PlacedBody, Scenario, motion, place_bodies, placement
+from blocksim.scenario import Model, PlacedBody, Scenario, motion, placement
 from blocksim.world.systems import system
 
 MILLI, DEGREES = 1e3, float(np.degrees(1.0))
@@ -99,7 +99,7 @@ BLOCKS = system.System(
         system.Channel("spin", "rad/s", "angular velocity", "spin_deg_s", DEGREES),
         system.Channel("kinetic_energy", "J", "kinetic energy", "kinetic_energy_J", formula=kinetic_energy),
     ),
-    elements=lambda scenario: block_system(place_bodies(scenario)).elements,
+    elements=lambda model: block_system(model.bodies).elements,
     state=lambda world, count: motion_of(world.bodies[:count]),
     outlines=corners,
 )
@@ -138,12 +138,12 @@ SUPPORTS = system.System(
 )
 
 
-def supports_track(scenario: Scenario, blocks: system.Track, times: system.Floats) -> system.Track:
+def supports_track(model: Model, blocks: system.Track, times: system.Floats) -> system.Track:
     """Return the supports of a run at these times (s), as far as its blocks reach."""
-    quads, walls = support_quads(scenario, blocks), len(placement.wall_segments(scenario))
+    quads, walls = support_quads(model.scenario, blocks), len(model.scenario.walls)
     names = (*["ground"] * (len(quads) - walls), *(f"wall {k}" for k in range(1, walls + 1)))
     elements = system.Elements(names, quads.reshape(-1, 8).T, np.zeros((len(SUPPORT_QUANTITIES), len(quads))))
-    course = np.concatenate(support_motion(scenario, times), axis=1)
+    course = np.concatenate(support_motion(model, times), axis=1)
     values = np.repeat(course[:, :, None], len(names), axis=2)
     return system.Track(system.SystemInScene(SUPPORTS, elements), values)
 
@@ -173,10 +173,10 @@ def support_quads(scenario: Scenario, blocks: system.Track) -> system.Floats:
     return np.array(quads).reshape(-1, 4, 2)
 
 
-def support_motion(scenario: Scenario, times: system.Floats) -> tuple[system.Floats, system.Floats]:
+def support_motion(model: Model, times: system.Floats) -> tuple[system.Floats, system.Floats]:
     """Return displacement (m) and velocity (m/s) of ground and walls along x and y at these times (s), (n, 2) each."""
-    if scenario.motion is None:
+    if model.scenario.motion is None:
         return np.zeros((len(times), 2)), np.zeros((len(times), 2))
-    along = motion.motion_direction(scenario)
-    displacement, velocity = motion.displacement_and_velocity(motion.motion_pieces(scenario), times)
+    along = motion.motion_direction(model.scenario)
+    displacement, velocity = motion.displacement_and_velocity(model.motion, times)
     return np.multiply.outer(displacement, along), np.multiply.outer(velocity, along)

@@ -9,8 +9,8 @@ from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.common.systems import Stages
 from blocksim.kernels.soil import arrays, contact, step
 from blocksim.kernels.sph.functions import WENDLAND_SUPPORT
-from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments, placement
-from blocksim.scenario.models.soil import RAMP_TIME, SoilTable
+from blocksim.scenario import GROUND, Model
+from blocksim.scenario.models.soil import RAMP_TIME
 from blocksim.world import build, interactions
 from blocksim.world.systems import soils
 
@@ -24,10 +24,9 @@ SKIN = 0.4  # of lists, in spacings
 FEW_TOUCHES = 128
 
 
-def build_soils(scenario: Scenario) -> arrays.Soils:
+def build_soils(model: Model) -> arrays.Soils:
     """Return the arrays of the soils of a scenario at time zero."""
-    tables = placement.soil_tables(scenario)
-    elements = soils.elements_of(scenario)
+    tables, elements = model.soils, soils.elements_of(model)
     initial, kinds = elements.start, {table.name: number for number, table in enumerate(tables)}
     n = initial.shape[1]
     points, states = zeros(n, arrays.POINT), zeros(n, arrays.STATE)
@@ -38,7 +37,7 @@ def build_soils(scenario: Scenario) -> arrays.Soils:
     states["kind"] = [kinds[name.rpartition(".")[0]] for name in elements.names]
     groups = math.ceil(n / arrays.GROUP)
     room = n + FEW_TOUCHES
-    bodies = len(place_bodies(scenario)) + len(place_segments(scenario)) + 1
+    bodies = len(model.bodies) + len(model.segments) + 1
     spacing, controls = tables[0].spacing, zeros(1, arrays.CONTROLS)
     one = controls[0]
     one.area = spacing**2
@@ -48,13 +47,13 @@ def build_soils(scenario: Scenario) -> arrays.Soils:
     one.radius = 0.5 * spacing
     one.viscosity = VISCOSITY
     one.ramp = RAMP_TIME if any(table.start == "ramp" for table in tables) else 0.0
-    one.blocks = len(place_bodies(scenario))
+    one.blocks = len(model.bodies)
     one.is_uniform = len(tables) == 1
     return arrays.Soils(
         points=points,
         states=states,
-        kinds=kind_records(scenario, tables),
-        interactions=interactions_with(scenario, tables),
+        kinds=kind_records(model),
+        interactions=interactions_with(model),
         order=build.numbers(n, np.uint32),
         starts=build.numbers(3 * n // 2 + 3, np.uint32),
         lists=build.numbers((groups, arrays.GROUP * arrays.NEIGHBOURS), np.uint32),
@@ -70,10 +69,11 @@ def build_soils(scenario: Scenario) -> arrays.Soils:
     )
 
 
-def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
+def kind_records(model: Model) -> Any:
     """Return one KIND for each soil."""
+    scenario, tables = model.scenario, model.soils
     records = zeros(len(tables), arrays.KIND)
-    depth = soils.depth_of_scene(scenario)
+    depth = soils.depth_of_scene(model)
     for record, table in zip(records, tables, strict=True):
         material = scenario.materials[table.material]
         lame, shear = soils.lame_constants(material)
@@ -88,11 +88,12 @@ def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
     return records
 
 
-def interactions_with(scenario: Scenario, tables: list[SoilTable]) -> Any:
+def interactions_with(model: Model) -> Any:
     """Return the parameters (soils, classes) of contacts with each class of bodies; see `world.interactions`."""
-    classes = interactions.contact_classes(scenario, place_bodies(scenario))
+    scenario, tables = model.scenario, model.soils
+    classes = interactions.contact_classes(scenario, model.bodies)
     records = zeros((len(tables), len(classes)), INTERACTION)
-    depth = soils.depth_of_scene(scenario)
+    depth = soils.depth_of_scene(model)
     for row, table in zip(records, tables, strict=True):
         young = scenario.materials[table.material].young_modulus
         for record, partner in zip(row, classes, strict=True):

@@ -10,13 +10,13 @@ presses as it should.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import GROUND, Scenario, geometry, overrides, place_bodies, placement, resolve_pair, start
+from blocksim.scenario import GROUND, Model, PlacedBody, Scenario, geometry, overrides, placement, resolve_pair, start
 from blocksim.scenario.models import contact, loads, timeline
 from blocksim.scenario.models.geometry import Material
 from blocksim.scenario.models.soil import RAMP_TIME, SoilTable
@@ -84,9 +84,9 @@ def earth_pressure_at_rest(material: Material) -> float:
     return max(poisson / (1.0 - poisson), (1.0 - slope) / (1.0 + 2.0 * slope))
 
 
-def depth_of_scene(scenario: Scenario) -> float:
+def depth_of_scene(model: Model) -> float:
     """Return the extent (m) of all soil out of the plane: that of the deepest block."""
-    return max((body.depth for body in place_bodies(scenario)), default=USUAL_DEPTH)
+    return max((body.depth for body in model.bodies), default=USUAL_DEPTH)
 
 
 def damping_at_start(scenario: Scenario, table: SoilTable) -> tuple[float, float]:
@@ -130,20 +130,20 @@ def geostatic_stress(scenario: Scenario, table: SoilTable, places: system.Floats
     return stress
 
 
-def known_errors(scenario: Scenario) -> Iterator[str]:
+def known_errors(model: Model) -> Iterator[str]:
     """Yield a warning for each load that soil does not feel, and for thrusts that are known to be too small."""
-    for number, load in enumerate(scenario.loads):
+    for number, load in enumerate(model.scenario.loads):
         if isinstance(load, loads.Horizontal | loads.Gravity):
             key = overrides.format_key(("loads", load.name or number))
             yield f"{key}: soil does not feel this load, blocks alone do; ground.tilt turns the gravity of both"
-    yield from weak_thrusts(scenario)
+    yield from weak_thrusts(model)
 
 
-def weak_thrusts(scenario: Scenario) -> Iterator[str]:
+def weak_thrusts(model: Model) -> Iterator[str]:
     """Yield a warning for each soil beside blocks that may yield, whose thrust on them is known to be too small."""
-    for soil in placement.soil_tables(scenario):
-        is_rough = friction_with(scenario, soil.material, GROUND, ground=True).static > 0.0
-        if is_rough and _is_beside_a_block(scenario, soil):
+    for soil in model.soils:
+        is_rough = friction_with(model.scenario, soil.material, GROUND, ground=True).static > 0.0
+        if is_rough and _is_beside_a_block(model.bodies, soil):
             rows = geometry.count_across(soil.corners, soil.spacing)[1]
             near, far = (per_row / rows + more for per_row, more in LACK[soil.gradient])
             key = overrides.format_key(("soils", soil.name, "gradient" if soil.gradient == "raw" else "spacing"))
@@ -155,10 +155,10 @@ def weak_thrusts(scenario: Scenario) -> Iterator[str]:
             )
 
 
-def _is_beside_a_block(scenario: Scenario, soil: SoilTable) -> bool:
+def _is_beside_a_block(placed: Iterable[PlacedBody], soil: SoilTable) -> bool:
     """Return True if a block that may move is less than a spacing to the left or right of a soil."""
     moved = [soil.corners + np.array([way, 0.0]) for way in (-soil.spacing, soil.spacing)]
-    for body in place_bodies(scenario):
+    for body in placed:
         if body.driven or not body.fixed:
             place = (np.array([value]) for value in (body.x, body.y, body.angle))
             corners = blocks.placed_points(np.array([body.corners]), *place)[0]
@@ -199,7 +199,7 @@ def connected_span(x: system.Floats, gap: float) -> tuple[float, float]:
     return float(ordered[first]), float(ordered[last])
 
 
-def final_table(scenario: Scenario, track: system.Track) -> system.Table:
+def final_table(model: Model, track: system.Track) -> system.Table:
     """Return the table of the last frame: a row for each soil.
 
     left and right end the part without a gap of 2 spacings, first and last particle wherever they are. The back is the
@@ -214,12 +214,12 @@ def final_table(scenario: Scenario, track: system.Track) -> system.Table:
         half = 0.5 * spacing
         x, y, vx, vy = (track[name][-1, own] for name in ("x", "y", "vx", "vy"))
         left, right = connected_span(x, GAP * spacing)
-        is_left = _is_left_back(track, own, scenario, (left, right))
+        is_left = _is_left_back(track, own, model.scenario, (left, right))
         near = x <= left + BACK * spacing if is_left else x >= right - BACK * spacing
         near &= (x >= left) & (x <= right)
         ends = (left - half, right + half, x.min() - half, x.max() + half)
         height = MILLI * float(y[near].max() + half)
-        rests = float(np.mean(np.hypot(vx, vy) < scenario.time.rest_speed))
+        rests = float(np.mean(np.hypot(vx, vy) < model.scenario.time.rest_speed))
         rows.append((name, *(MILLI * float(end) for end in ends), "left" if is_left else "right", height, rests))
     return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
 
@@ -309,13 +309,13 @@ SHADES = (
 )
 
 
-def elements_of(scenario: Scenario) -> system.Elements:
+def elements_of(model: Model) -> system.Elements:
     """Return the particles of all soils of a scenario."""
-    tables = placement.soil_tables(scenario)
-    places = [start.particle_places(table, scenario) for table in tables]  # m, (n, 2)
+    scenario, tables = model.scenario, model.soils
+    places = [start.particle_places(table, model.bodies) for table in tables]  # m, (n, 2)
     soils = [*zip(tables, places, strict=True)]
     names = tuple(f"{table.name}.{number}" for table, one in soils for number in range(1, len(one) + 1))
-    depth = depth_of_scene(scenario)
+    depth = depth_of_scene(model)
     each = [scenario.materials[table.material].density * table.spacing**2 * depth for table in tables]
     masses = np.repeat(each, [len(one) for one in places])
     constants = np.stack([masses, np.full(len(names), tables[0].spacing)])
@@ -334,8 +334,8 @@ def _state(soils: Any, count: int) -> system.Floats:
     return values
 
 
-def _largest_step(scenario: Scenario) -> float:
-    tables = placement.soil_tables(scenario)
+def _largest_step(model: Model) -> float:
+    scenario, tables = model.scenario, model.soils
     usual = float(timeline.Explicit.model_fields["safety"].default)
     finer = min(1.0, float(getattr(scenario.time, "safety", usual)) / usual)  # a finer step is finer for all
     courant = COURANT * finer
@@ -369,12 +369,12 @@ SOILS = system.System(
     state=_state,
     outlines=lambda track, chosen: system.discs(track, chosen, 0.5 * track["spacing"]),
     energies=ENERGIES,
-    build=lambda scenario: soil_kernels().build_soils(scenario),
+    build=lambda model: soil_kernels().build_soils(model),
     largest_step=_largest_step,
     stages=lambda: soil_kernels().STAGES,
     cost=COST,
-    dearer=lambda scenario: max(GRADIENT_COST[table.gradient] for table in placement.soil_tables(scenario)),
-    parts=lambda scenario: tuple(table.name for table in placement.soil_tables(scenario)),
+    dearer=lambda model: max(GRADIENT_COST[table.gradient] for table in model.soils),
+    parts=lambda model: tuple(table.name for table in model.soils),
     touching=body_contacts,
     shades=SHADES,
     ending=final_table,

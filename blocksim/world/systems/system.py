@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import Scenario
+from blocksim.scenario import Model
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.systems import Stages
@@ -101,21 +101,21 @@ class System:
     quantities: tuple[Dataset, ...]  # kept of every element in every frame
     constants: tuple[Dataset, ...]  # kept of every element once
     outputs: tuple[Channel, ...]
-    elements: Callable[[Scenario], Elements]
+    elements: Callable[[Model], Elements]
     state: Callable[[Any, int], Floats]  # of the arrays of a scene with so many elements, (q, b)
     outlines: Callable[["Track", Indices], Floats]  # corners (m, counter-clockwise) in some frames, (f, b, k, 2)
     energies: tuple[str, ...] = ()  # J, that it adds to the ledger
-    build: Callable[[Scenario], Any] | None = None  # its arrays at time zero, where they are not in the world
-    largest_step: Callable[[Scenario], float] | None = None  # s; None: the scheme knows
+    build: Callable[[Model], Any] | None = None  # its arrays at time zero, where they are not in the world
+    largest_step: Callable[[Model], float] | None = None  # s; None: the scheme knows
     stages: Callable[[], "Stages"] | None = None  # its compiled functions, where they are not those of a scheme
     cost: Cost = field(default_factory=Cost)  # of every element, where it is not part of the blocks'
-    dearer: Callable[[Scenario], float] = lambda _: 1.0  # time of a step of the elements of a scene over that, at most
-    parts: Callable[[Scenario], tuple[str, ...]] | None = None  # names of its tables, which probes of force may name
+    dearer: Callable[[Model], float] = lambda _: 1.0  # time of a step of the elements of a scene over that, at most
+    parts: Callable[[Model], tuple[str, ...]] | None = None  # names of its tables, which probes of force may name
     touching: Callable[[Any, Any], BodyContacts] | None = None  # of its arrays and the world
     shades: tuple[Shade, ...] = ()  # the first one is the default
-    ending: Callable[[Scenario, "Track"], Table] | None = None  # of the last frame, one row a part
+    ending: Callable[[Model, "Track"], Table] | None = None  # of the last frame, one row a part
     profile: Callable[["Track", int], list[Floats]] | None = None  # lines (m, (k, 2)) of its surface in a frame
-    warnings: Callable[[Scenario], Iterator[str]] | None = None  # of results that are known to be off
+    warnings: Callable[[Model], Iterator[str]] | None = None  # of results that are known to be off
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from blocksim.bench import harness
 from blocksim.bench.harness import FRICTION, Number, Rerun, TimeSteps
-from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.scenario import Model, PlacedBody, Scenario
 from blocksim.scenario.geometry import edges_of
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import ALONE
@@ -50,7 +50,7 @@ class Scene:
 
     def placed(self) -> list[PlacedBody]:
         """Return the blocks at the start."""
-        bodies = place_bodies(self.make())
+        bodies = Model(self.make()).bodies
         return [body._replace(x=body.x + by) for body, by in zip(bodies, self.shift.tolist(), strict=True)]
 
 

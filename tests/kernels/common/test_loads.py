@@ -8,7 +8,7 @@ import pytest
 
 from blocksim.kernels.common.arrays import World
 from blocksim.kernels.common.loads import Pose, force_at, value_at
-from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario import Model, Scenario, scenario_from_mapping
 from blocksim.simulation import simulate
 from blocksim.world.build import build_world
 
@@ -81,7 +81,7 @@ def test_a_constant_force_and_a_moment_accelerate_a_free_block_exactly_and_work_
 def test_water_on_a_face_is_the_exact_integral_along_it(level: float, angle: float) -> None:
     """Below it, above it, halfway up, and on a face that has turned."""
     load = {"kind": "pressure", "body": "1", "face": "left", "water_level": level, "unit_weight": "10 kN/m^3"}
-    world: World = build_world(scenario_with(load, bodies=[{"block": "b", "x": 0.0, "y": 1.0}]))
+    world: World = build_world(Model(scenario_with(load, bodies=[{"block": "b", "x": 0.0, "y": 1.0}])))
     fx, fy, torque = force_at(
         world, world.loads[0], 0.0, Pose(0.0, 1.0, math.cos(angle), math.sin(angle), 0.0, 0.0, 0.0)
     )
@@ -107,7 +107,7 @@ def test_factor_is_that_of_the_time_in_the_history_of_a_load_among_others(
     history: dict[str, Any], factors: list[float]
 ) -> None:
     force = {"kind": "force", "body": "1", "magnitude": 1.0}
-    world: World = build_world(scenario_with(force, {**force, "history": history}, force))
+    world: World = build_world(Model(scenario_with(force, {**force, "history": history}, force)))
     assert [value_at(world, world.loads[1], 0.1 * k + 0.05) for k in range(9)] == pytest.approx(factors)
     assert [value_at(world, world.loads[n], 0.55) for n in (0, 2)] == [1.0, 1.0]
 

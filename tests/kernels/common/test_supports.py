@@ -13,6 +13,7 @@ from blocksim.kernels.common.arrays import AT_REST, BODY, CONTROLS, MOTION_PIECE
 from blocksim.kernels.common.mechanics import accelerate_and_kick
 from blocksim.kernels.common.members import Watched, frame_to_watch, watch
 from blocksim.kernels.common.supports import acceleration, displacement, tally_moved
+from blocksim.scenario import Model
 from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
 from blocksim.world.build import build_world
 
@@ -69,7 +70,7 @@ def on_support(
         time={"stop_at_rest": False, **(time or {})},
         **tables,
     )
-    world = build_world(scenario)
+    world = build_world(Model(scenario))
     if pieces is not None:
         world = world._replace(motion=pieces)
         world.controls.motion_x, world.controls.motion_y = cos(direction), sin(direction)

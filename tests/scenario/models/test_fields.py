@@ -15,6 +15,7 @@ from blocksim.errors import ScenarioError
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import (
     Document,
+    Model,
     Scenario,
     json_schema,
     load_scenario,
@@ -75,7 +76,7 @@ def test_names_are_those_of_folders_everywhere_and_editors_are_told_the_same() -
         with pytest.raises(ScenarioError, match="is not a name"):
             scenario_from_mapping(data_of(name=name))
     for name in FINE:
-        folder = default_folder(scenario_from_mapping(data_of(name=name)))
+        folder = default_folder(Model(scenario_from_mapping(data_of(name=name))))
         assert folder.parent.name == name
         assert folder.resolve().parent.parent == RESULTS.resolve()
     pattern = json_schema()["properties"]["name"]["pattern"].replace("$", r"\Z")  # it allows no line feed behind it

@@ -7,15 +7,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import (
-    geometry,
-    place_bodies,
-    placement,
-    scenario_from_mapping,
-    scenario_hash,
-    scenario_to_toml,
-    start,
-)
+from blocksim.scenario import Model, geometry, placement, scenario_from_mapping, scenario_hash, scenario_to_toml, start
 from blocksim.scenario.models.soil import SoilTable
 from tests.soils import MATERIALS, column, data_of, scene
 
@@ -66,8 +58,9 @@ def arch_under(level: float) -> dict[str, Any]:
 def test_fill_lies_around_and_above_blocks_but_not_in_and_below_them() -> None:
     scenario = scenario_from_mapping(arch_under(0.8))
     (soil,) = placement.soil_tables(scenario)
-    places, whole = start.particle_places(soil, scenario), geometry.fill_lattice(soil.corners, soil.spacing)
-    outlines = [np.array([body.ground_point(*at) for at in body.corners]) for body in place_bodies(scenario)]
+    bodies = Model(scenario).bodies
+    places, whole = start.particle_places(soil, bodies), geometry.fill_lattice(soil.corners, soil.spacing)
+    outlines = [np.array([body.ground_point(*at) for at in body.corners]) for body in bodies]
     apart = np.min([geometry.edge_distance(places, corners) for corners in outlines], axis=0)
     assert apart.min() >= 0.4999 * soil.spacing
     for corners in outlines:

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.scenario import Model, PlacedBody, Scenario
 from blocksim.scenario.events import joint_between
 from blocksim.scenario.geometry import area_of, faults
 from blocksim.scenario.overlap import overlapping_pairs
 from blocksim.scenario.overrides import freeze
+from blocksim.scenario.placement import place
 from blocksim.scenario.start import impossible_starts
 from tests.scenario.conftest import data_of
 
@@ -26,8 +27,8 @@ def scenario(**structure: Any) -> Scenario:
 
 def built(**structure: Any) -> tuple[PlacedBody, ...]:
     found = scenario(**structure)
-    assert [*impossible_starts(found)] == []
-    return place_bodies(found)
+    assert [*impossible_starts(found, lambda: place(found))] == []
+    return Model(found).bodies
 
 
 def corners(body: PlacedBody) -> NDArray[np.float64]:

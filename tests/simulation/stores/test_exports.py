@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import load_scenario, place_bodies
+from blocksim.scenario import Model, load_scenario
 from blocksim.scenario.geometry import regular
 from blocksim.scenario.structures.drawings import read_drawing
 from blocksim.simulation.files import refuse_foreign
@@ -52,25 +52,25 @@ def test_frames_and_contacts_are_the_tables_that_were_read(tmp_path: Path, golde
 
 def test_geojson_has_the_last_outlines_with_their_blocks(tmp_path: Path) -> None:
     path = tmp_path / "end.geojson"
-    assert write_geojson(path, FRAMES, SCENARIO) == 3
+    assert write_geojson(path, FRAMES, Model(SCENARIO)) == 3
     refuse_foreign(path)  # it is one of blocksim
     data = json.loads(path.read_text())
     assert [one["properties"]["name"] for one in data["features"]] == ["1", "2", "3"]
     assert data["features"][2]["properties"]["rotation_deg"] == pytest.approx(-90.0)
     for number, (one, count) in enumerate(zip(read_drawing(path).outlines, (3, 4, 3), strict=True)):
         assert np.array(one.outline) == pytest.approx(1e-3 * corners(FRAMES, 4)[number, :count])
-        assert one.properties["block"] == place_bodies(SCENARIO)[number].block
+        assert one.properties["block"] == Model(SCENARIO).bodies[number].block
 
 
 def test_removed_blocks_and_frames_that_are_not_finite_are_not_drawn(tmp_path: Path) -> None:
     x, vx = FRAMES.x.copy(), FRAMES.vx.copy()
     x[4, 0], vx[3, 1] = np.nan, np.nan
-    assert write_geojson(tmp_path / "end.geojson", replace(FRAMES, x=x, vx=vx), SCENARIO) == 2
+    assert write_geojson(tmp_path / "end.geojson", replace(FRAMES, x=x, vx=vx), Model(SCENARIO)) == 2
     first = read_drawing(tmp_path / "end.geojson").outlines[0]
     assert np.array(first.outline) == pytest.approx(1e-3 * corners(FRAMES, 3)[0, :3])
     for write in (write_geojson, write_vtkhdf):
         with pytest.raises(InvalidInputError, match="no frame to export"):
-            write(tmp_path / "none", replace(FRAMES, x=np.full_like(x, np.nan)), SCENARIO)
+            write(tmp_path / "none", replace(FRAMES, x=np.full_like(x, np.nan)), Model(SCENARIO))
 
 
 def test_dxf_has_them_with_blocks_names_and_what_is_fixed(tmp_path: Path) -> None:
@@ -79,9 +79,9 @@ def test_dxf_has_them_with_blocks_names_and_what_is_fixed(tmp_path: Path) -> Non
     support = {"block": "brick", "x": "0.5 m", "y": "25 mm", "fixed": True, "name": "key-stone"}
     scenario = load_scenario(SCENARIOS / "three_blocks.toml", {"bodies": [support]})
     frames = polygons(toppling(4, steps=5), WEDGE)
-    assert write_dxf(path, frames, scenario) == 4
+    assert write_dxf(path, frames, Model(scenario)) == 4
     refuse_foreign(path)  # it is one of blocksim
-    read, placed = read_drawing(path).outlines, place_bodies(scenario)
+    read, placed = read_drawing(path).outlines, Model(scenario).bodies
     assert np.array(read[0].outline) == pytest.approx(1e-3 * corners(frames, 4)[0, :3])
     told = [tuple(one.properties[name] for name in ("block", "name", "fixed")) for one in read]
     assert told == [(body.block, body.name, body.fixed) for body in placed]
@@ -96,7 +96,7 @@ def written(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.
     """Give frames of three blocks and their file, written some blocks at once."""
     monkeypatch.setattr(exports, "BATCH", request.param)
     frames = toppling(3, steps=11)
-    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, SCENARIO) == 11
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, Model(SCENARIO)) == 11
     return frames, tmp_path / "run.vtkhdf"
 
 
@@ -132,7 +132,7 @@ def test_parts_of_every_time_are_found_where_the_steps_say(written: tuple[Frames
 def test_cells_of_polygons_have_their_own_corners(tmp_path: Path) -> None:
     hexagon = regular(6, 0.02)
     frames = polygons(toppling(3, steps=4), WEDGE, hexagon)
-    write_vtkhdf(tmp_path / "run.vtkhdf", frames, SCENARIO)
+    write_vtkhdf(tmp_path / "run.vtkhdf", frames, Model(SCENARIO))
     with h5py.File(tmp_path / "run.vtkhdf") as file:
         group = file["VTKHDF"]
         assert group["Types"][:].tolist() == [7, 7, 7, 9]
@@ -177,7 +177,7 @@ def test_vtk_reads_back_names_and_the_contacts_of_every_finite_time(tmp_path: Pa
     frames = replace(toppling(len(names), steps=4), names=names, contacts=join_contacts(tables))
     frames.vx[2, 1] = np.inf  # a frame that neither file has
     assert frames.contacts is not None
-    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, SCENARIO) == 3
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, Model(SCENARIO)) == 3
     assert write_contacts_vtkhdf(tmp_path / "contacts.vtkhdf", frames, frames.contacts) == 3
     with h5py.File(tmp_path / "run.vtkhdf") as stored:
         assert tuple(name.decode() for name in stored["blocksim/block_names"][:]) == names

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputError
-from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.scenario import Model, PlacedBody, Scenario
 from blocksim.simulation import Result
 from blocksim.simulation.instruments import MOTION, Frame, Recorder
 from blocksim.simulation.schemes import SCHEMES
@@ -73,10 +73,10 @@ def test_every_number_comes_back_under_its_name(scenario: Scenario, tmp_path: Pa
     random, path = np.random.default_rng(1), tmp_path / "run.h5"
     rows = [(random.random((len(MOTION), 3)), random.random(len(SCHEME.row_names))) for _ in range(3)]
     written = [Frame(step, (motion,), measured) for step, (motion, measured) in zip((0, 5, 7), rows, strict=True)]
-    with opened(path, place_bodies(scenario)) as sink:
+    with opened(path, Model(scenario).bodies) as sink:
         for frame in written:
             sink.append(frame)
-    back = read_frames(path, scenario)
+    back = read_frames(path, Model(scenario))
     assert back.step.tolist() == [0, 5, 7]
     assert back.time.tolist() == [0.0, 5 * STEP, 7 * STEP]
     for place, name in enumerate(MOTION):
@@ -88,14 +88,14 @@ def test_every_number_comes_back_under_its_name(scenario: Scenario, tmp_path: Pa
 
 def test_what_was_committed_is_there_under_way_and_after_a_kill(scenario: Scenario, tmp_path: Path) -> None:
     path, killed = tmp_path / "run.h5", tmp_path / "killed.h5"
-    with opened(path, place_bodies(scenario), contacts=True) as sink:
+    with opened(path, Model(scenario).bodies, contacts=True) as sink:
         add_frames(sink, 0, 1000)
         sink.commit()
         add_frames(sink, 1000, 1400)
-        assert len(read_frames(path, scenario)) == 1000
+        assert len(read_frames(path, Model(scenario))) == 1000
         shutil.copyfile(path, killed)  # the writer never closed this one
     for file, count in ((killed, 1000), (path, 1400)):
-        frames = read_frames(file, scenario)
+        frames = read_frames(file, Model(scenario))
         assert frames.contacts is not None
         assert len(frames) == len(frames.contacts) == count
         assert frames.x[-1].tolist() == [count - 1.0] * 3
@@ -103,16 +103,16 @@ def test_what_was_committed_is_there_under_way_and_after_a_kill(scenario: Scenar
             np.testing.assert_array_equal(frames.contacts.at(step), table_of(step))
     with h5py.File(path, "r+") as stored:
         stored["n_committed"][()] = 2  # killed after the third was written, before it was announced
-    assert read_frames(path, scenario).step.tolist() == [0, 1]
+    assert read_frames(path, Model(scenario)).step.tolist() == [0, 1]
     with h5py.File(path, "r+") as stored:
         stored["n_committed"][()] = 1400
         stored["contacts/normal_force"].resize(3, axis=0)
     with pytest.raises(InvalidInputError, match="contacts/normal_force: holds 3 contacts, not 1399"):
-        read_frames(path, scenario)
+        read_frames(path, Model(scenario))
 
 
 def test_outlines_are_stored_once_and_rectangles_store_none(scenario: Scenario, tmp_path: Path) -> None:
-    first, *others = place_bodies(scenario)
+    first, *others = Model(scenario).bodies
     wedge = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02))
     for placed, name in (((first, *others), "plain"), ((first._replace(outline=wedge), *others), "outlined")):
         opened(tmp_path / name, placed).close()
@@ -134,13 +134,13 @@ def test_a_file_system_without_locks_is_told_what_to_set(scenario: Scenario, tmp
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(h5py, "File", refuse)
         with pytest.raises(OutputError, match=remedy):
-            opened(tmp_path / "run.h5", place_bodies(scenario))
-    with opened(tmp_path / "run.h5", place_bodies(scenario)) as sink:
+            opened(tmp_path / "run.h5", Model(scenario).bodies)
+    with opened(tmp_path / "run.h5", Model(scenario).bodies) as sink:
         add_frames(sink, 0, 4)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(h5py, "File", refuse)
         with pytest.raises(InvalidInputError, match=remedy):
-            read_frames(tmp_path / "run.h5", scenario)
+            read_frames(tmp_path / "run.h5", Model(scenario))
 
 
 def test_full_disk_is_one_message_and_the_file_stays_readable(
@@ -150,7 +150,7 @@ def test_full_disk_is_one_message_and_the_file_stays_readable(
         raise OSError(28, "No space left on device")
 
     def fill_disk() -> None:
-        with opened(tmp_path / "run.h5", place_bodies(scenario)) as sink:
+        with opened(tmp_path / "run.h5", Model(scenario).bodies) as sink:
             add_frames(sink, 0, 4)
             sink.commit()
             monkeypatch.setattr("os.posix_fallocate", no_room)
@@ -159,9 +159,9 @@ def test_full_disk_is_one_message_and_the_file_stays_readable(
 
     with pytest.raises(OutputError, match=r"run\.h5: cannot be written: No space left on device"):
         fill_disk()
-    assert len(read_frames(tmp_path / "run.h5", scenario)) == 4
+    assert len(read_frames(tmp_path / "run.h5", Model(scenario))) == 4
     with pytest.raises(OutputError, match="No such file or directory"):
-        opened(tmp_path / "nowhere" / "run.h5", place_bodies(scenario))
+        opened(tmp_path / "nowhere" / "run.h5", Model(scenario).bodies)
 
 
 LEDGER = ("kinetic", "potential")
@@ -179,7 +179,7 @@ def two_blocks() -> Scenario:
 def files(two_blocks: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder of closed.h5 and left_open.h5, as it is on the disk while its writer is at work."""
     folder = tmp_path_factory.mktemp("files")
-    with FrameFile(folder / "closed.h5", Recorder(place_bodies(two_blocks), 1.0, 1e-5), "", LEDGER) as sink:
+    with FrameFile(folder / "closed.h5", Recorder(Model(two_blocks).bodies, 1.0, 1e-5), "", LEDGER) as sink:
         for step in range(FRAMES):
             sink.append(Frame(step, (np.full((len(MOTION), 2), step),), np.ones(len(LEDGER) + 2)))
         sink.commit()
@@ -195,7 +195,7 @@ def refusal(two_blocks: Scenario, files: Path, tmp_path: Path) -> Callable[[Chan
         with h5py.File(path, "r+") as file:
             change(file)
         with pytest.raises(InvalidInputError, match=r"run\.h5: not a complete run file: ") as caught:
-            read_frames(path, two_blocks)
+            read_frames(path, Model(two_blocks))
         return str(caught.value).partition("run file: ")[2]
 
     return refuse
@@ -304,7 +304,7 @@ def test_a_file_that_was_not_closed_gives_all_committed_frames(files: Path, two_
     with pytest.raises(OSError, match="already open for write"):
         h5py.File(path, "r")
     before = path.read_bytes()
-    assert read_frames(path, two_blocks).x[:, 0].tolist() == list(range(FRAMES))
+    assert read_frames(path, Model(two_blocks)).x[:, 0].tolist() == list(range(FRAMES))
     assert path.read_bytes() == before, "reading has changed the file"
 
 
@@ -325,12 +325,12 @@ def test_a_file_that_is_cut_off_or_overwritten_is_refused_at_once(
     (tmp_path / "run.h5").write_bytes(content)
     began = time.process_time()
     with pytest.raises(InvalidInputError, match=rf"run\.h5: {told}"):
-        read_frames(tmp_path / "run.h5", two_blocks)
+        read_frames(tmp_path / "run.h5", Model(two_blocks))
     assert time.process_time() - began < 5.0
 
 
 def test_a_file_of_other_bodies_or_none_is_refused(files: Path, tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="holds 2 bodies, not 1"):
-        read_frames(files / "closed.h5", scenario_of([{"y": 0.0125}]))
+        read_frames(files / "closed.h5", Model(scenario_of([{"y": 0.0125}])))
     with pytest.raises(InputMissingError, match="no such file"):
-        read_frames(tmp_path / "run.h5", scenario_of([{"y": 0.0125}]))
+        read_frames(tmp_path / "run.h5", Model(scenario_of([{"y": 0.0125}])))

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from blocksim.errors import InvalidInputError, UnavailableError
-from blocksim.scenario import Document
+from blocksim.scenario import Document, Model
 from blocksim.simulation import files, simulate
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.results import read_summary
@@ -108,7 +108,7 @@ def test_stopped_executor_begins_no_batch(quick: Document, name: str) -> None:
     def tasks() -> Iterator[Task]:
         for number in range(10):
             made.append(number)
-            yield Task(number, str(number), {}, quick.build())
+            yield Task(number, str(number), {}, Model(quick))
 
     with load_executor(name).for_rounds() as run:
         assert list(run(tasks(), RunSetting(2, is_stopped=lambda: True))) == []
@@ -120,7 +120,7 @@ def test_ctrl_c_ends_the_workers_at_once(nominal: Document, tmp_path: Path) -> N
     # of few frames: a run whose results may not fit on the disk is refused before it starts
     endless = nominal.with_values({"time.end": 1e5, "time.stop_at_rest": False, "output.every": 10.0}).build()
     scenarios = {"quick": quick, "a": endless, "b": endless}
-    tasks = (Task(number, name, {}, one) for number, (name, one) in enumerate(scenarios.items()))
+    tasks = (Task(number, name, {}, Model(one)) for number, (name, one) in enumerate(scenarios.items()))
     with load_executor("processes").for_rounds() as run:
         batches = run(tasks, RunSetting(2, folder=tmp_path))
         assert next(batches).tasks[0].name == "quick"
@@ -209,13 +209,13 @@ def test_blocks_that_settled_have_moved_from_where_they_settled_together_and_in_
 ) -> None:
     soft = {"contact.stiffness_scale": 3e-7, "start.settle": True, "bodies.0.velocity": [0.0, 0.0]}
     scenario = slide.with_values({**soft, "ground.tilt": "5 deg"}).build()
-    (row,) = rows_of([scenario], 1, peaks=True)
+    (row,) = rows_of([Model(scenario)], 1, peaks=True)
     assert row["outcome"] == "stands"
     assert abs(float(str(row["displacement_mm"]))) < 1e-3
     assert abs(float(str(row["turn_deg"]))) < 1e-3
     assert 12.5 - float(str(row["block.y_mm"])) > 0.01 * 25.0  # that far a block has moved
-    assert run_case(scenario, tmp_path / "case") == row
-    assert run_case(scenario, tmp_path / "case") == row  # as the folder has it
+    assert run_case(Model(scenario), tmp_path / "case") == row
+    assert run_case(Model(scenario), tmp_path / "case") == row  # as the folder has it
 
 
 @pytest.mark.parametrize("lost", [None, "run.h5", "checkpoint.0"])
@@ -224,12 +224,12 @@ def test_interrupted_case_continues_where_it_can(
 ) -> None:
     monkeypatch.setattr("blocksim.simulation.interruption.WallTime.check", lambda _: None)  # it comes later
     scenario = nominal.with_values({"time.end": 0.01}).build()
-    whole = run_case(scenario, tmp_path / "whole")
+    whole = run_case(Model(scenario), tmp_path / "whole")
     stopped = run(scenario, out=tmp_path / "case", precautions=CheckpointPolicy(wall_time=0.0))
     assert stopped.status == "interrupted"
     if lost is not None:
         (tmp_path / "case" / lost).unlink()
-    assert run_case(scenario, tmp_path / "case") == whole
+    assert run_case(Model(scenario), tmp_path / "case") == whole
     parts = read_summary(tmp_path / "case" / files.SUMMARY).resumed_from
     assert parts == (() if lost else (stopped.summary.steps,))
     ends = [(tmp_path / name / files.FINAL).read_bytes() for name in ("whole", "case")]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import Scenario, load_scenario, place_bodies
+from blocksim.scenario import Model, Scenario, load_scenario
 from blocksim.simulation import files
 from blocksim.simulation.balance import EnergyLedger
 from blocksim.simulation.files import keep_scenario, read_tables
@@ -29,7 +29,7 @@ def write_run(
     folder.mkdir(parents=True)
     keep_scenario(scenario, read_tables(scenario), folder)
     write_frames(folder / files.FRAMES, scenario, count)
-    frames = read_frames(folder / files.FRAMES, scenario)
+    frames = read_frames(folder / files.FRAMES, Model(scenario))
     (folder / files.FINAL).write_text(csv_text(final_columns(frames)), encoding="utf-8")
     (folder / files.SUMMARY).write_text(summary_of(scenario.name, count).to_json(), encoding="utf-8")
     (folder / files.DONE).write_text('{"run": "made-up", "status": "finished"}', encoding="utf-8")
@@ -38,7 +38,7 @@ def write_run(
 
 def write_frames(path: Path, scenario: Scenario, count: int) -> None:
     """Write frames in which every block but the first goes its own way and turns."""
-    placed = place_bodies(scenario)
+    placed = Model(scenario).bodies
     start = np.array([[body.x, body.y, body.angle, 0.0, 0.0, 0.0] for body in placed]).T
     numbers = np.arange(len(placed)) / len(placed)
     speed = np.array([0.5 * numbers, 0.2 * numbers, -4.0 * numbers])

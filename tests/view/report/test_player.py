@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Model, load_scenario
 from blocksim.scenario.geometry import regular
 from blocksim.simulation.results import EventRecord
 from blocksim.study.pictures import read_sweep_data
@@ -46,16 +46,16 @@ def test_page_knows_when_blocks_and_walls_are_gone(tmp_path: Path) -> None:
     frames.vx[3:, 1] = np.nan
     happened = EventRecord(event=0, step=10, time_s=float(frames.time[2]), what="", energy_J=0.0)
     kept = np.array([0, 2, 3, 4])
-    data = scene_data(frames, scenario, kept, [happened])
+    data = scene_data(frames, Model(scenario), kept, [happened])
     assert data["gone"] == [None, 2, *[None] * (len(frames.names) - 2)]
     assert data["walls_gone"] == [1, *[None] * (len(scenario.walls) - 1)]
-    assert scene_data(frames, scenario, kept)["walls_gone"] == [None] * len(scenario.walls)
+    assert scene_data(frames, Model(scenario), kept)["walls_gone"] == [None] * len(scenario.walls)
 
 
 @pytest.mark.parametrize("model", ["particles", "kernel"])
 def test_particles_are_those_of_the_world(model: str) -> None:
     scenario = load_scenario(SCENARIOS / "three_blocks_particles.toml", {"contact.model": model})
-    world = build_world(scenario)
+    world = build_world(Model(scenario))
     body = world.bodies[0]
     own = world.particles[int(body.first_particle) : int(body.first_particle + body.particle_count)]
     expected = np.unique(np.stack([own.x, own.y], axis=-1).round(9), axis=0)

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 import blocksim
 from blocksim.kernels.soil import arrays
-from blocksim.scenario import GROUND, load_scenario
+from blocksim.scenario import GROUND, Model, load_scenario
 from blocksim.scenario.models.contact import PairFriction
 from blocksim.simulation import Result
-from blocksim.simulation.schemes import build, build_scene
+from blocksim.simulation.schemes import build
 from blocksim.simulation.stores.exports import write_frames_csv, write_vtkhdf
 from blocksim.simulation.trajectory import data_set, tidy_table
 from blocksim.view.history import MOTIONS, FramesInView
@@ -56,7 +56,7 @@ def test_the_two_yield_surfaces_are_those_that_are_printed() -> None:
 
 def test_the_start_is_within_the_yield_surface_and_carries_the_weight_above() -> None:
     upper = {**column(0.05, 0.05, 0.005), "name": "upper", "y": [0.1, 0.15]}
-    elements = SOILS.elements(scene(COLUMN, upper))
+    elements = SOILS.elements(Model(scene(COLUMN, upper)))
     x, y, _, _, sxx, syy, szz, sxy, _ = elements.start
     np.testing.assert_allclose(syy, -UNIT_WEIGHT * (0.15 - y))
     at_rest = earth_pressure_at_rest(scene(COLUMN).materials["rods"])
@@ -69,13 +69,13 @@ def test_the_start_is_within_the_yield_surface_and_carries_the_weight_above() ->
 
 
 def test_a_ramp_starts_without_stress() -> None:
-    assert not SOILS.elements(scene({**COLUMN, "start": "ramp"})).start[4:].any()
+    assert not SOILS.elements(Model(scene({**COLUMN, "start": "ramp"}))).start[4:].any()
 
 
 def test_friction_is_of_the_pair_else_of_the_soil_itself() -> None:
     faces = [right(0.05), {"from": [0.5, 0.0], "to": [0.5, 0.1], "material": "soft"}]
     scenario = scene(COLUMN, walls=faces, pairs=SMOOTH_WALLS, friction={"block_ground": 0.1})
-    classes = contact_classes(scenario, build(scenario).placed)
+    classes = contact_classes(scenario, Model(scenario).bodies)
     assert friction_with(scenario, "rods", GROUND, ground=True) == PairFriction(static=math.tan(ANGLE))
     found = {
         one.material: friction_with(scenario, "rods", str(one.material), ground=True).static
@@ -87,7 +87,7 @@ def test_friction_is_of_the_pair_else_of_the_soil_itself() -> None:
 
 def test_a_contact_is_as_stiff_as_its_soil_is_deep() -> None:
     scenario = scene(COLUMN)
-    table = interactions_with(scenario, list(scenario.systems["soils"]))  # type: ignore[arg-type]  # they are soils
+    table = interactions_with(Model(scenario))
     np.testing.assert_allclose(table["normal_stiffness"], 5.84e6 * DEPTH)
 
 
@@ -95,17 +95,17 @@ def test_the_step_is_that_of_the_waves_in_the_soil() -> None:
     modulus = 5.84e6 * 0.7 / (1.3 * 0.4)
     expected = 0.4 * 1.5 * 0.005 / math.sqrt(modulus / (UNIT_WEIGHT / 9.81))
     assert SOILS.largest_step is not None
-    assert SOILS.largest_step(scene(COLUMN)) == pytest.approx(expected)
-    alone = build_scene(scene(COLUMN, blocks={}, bodies=[]))
+    assert SOILS.largest_step(Model(scene(COLUMN))) == pytest.approx(expected)
+    alone = build(Model(scene(COLUMN, blocks={}, bodies=[])))
     assert alone.world.controls[0].step == pytest.approx(expected, rel=0.01)
-    assert SOILS.largest_step(scene(COLUMN, time={"end": 1.0, "safety": 0.025})) == pytest.approx(0.5 * expected)
-    assert SOILS.largest_step(scene(COLUMN, time={"end": 1.0, "safety": 0.1})) == pytest.approx(expected)
+    assert SOILS.largest_step(Model(scene(COLUMN, time={"end": 1.0, "safety": 0.025}))) == pytest.approx(0.5 * expected)
+    assert SOILS.largest_step(Model(scene(COLUMN, time={"end": 1.0, "safety": 0.1}))) == pytest.approx(expected)
 
 
 def test_check_tells_whose_step_is_taken_and_which_stiffness_makes_both_equal() -> None:
-    limits = describe(scene(COLUMN)).limits
+    limits = describe(Model(scene(COLUMN))).limits
     assert limits is not None
-    equal = describe(scene(COLUMN, contact={"stiffness_scale": limits.scale})).limits
+    equal = describe(Model(scene(COLUMN, contact={"stiffness_scale": limits.scale}))).limits
     assert equal is not None
     assert equal.blocks == pytest.approx(equal.systems, rel=1e-3)
     assert limits.blocks != pytest.approx(limits.systems, rel=0.1)
@@ -116,7 +116,7 @@ def test_the_ledger_names_energies_in_the_order_in_which_they_are_measured() -> 
 
 
 def test_arrays_of_soil_take_as_many_bytes_as_check_estimates() -> None:
-    built: Any = build_scene(scene(column(0.25, 0.2, 0.005)))
+    built: Any = build(Model(scene(column(0.25, 0.2, 0.005))))
     taken = sum(array.nbytes for array in built.systems[0])
     assert 0.95 * SOILS.cost.memory < taken / 2000 <= SOILS.cost.memory <= 400
 
@@ -146,7 +146,7 @@ def test_thrust_that_is_known_to_be_too_small_is_warned_of(
     pairs = {"rods": {"ground": {"friction": base}}}
     table = column(0.1, 0.1, 0.005, **keys)
     held = scene(table, blocks=blocks, bodies=[{**WALL, **body}], pairs=pairs, end=1e-3)
-    found = describe(held).warnings
+    found = describe(Model(held)).warnings
     assert [text.partition("too small")[0] for text in found] == expected
     if expected:
         assert found == blocksim.run(held).summary.warnings
@@ -157,7 +157,7 @@ def test_thrust_of_walls_that_go_on_is_warned_of_by_what_was_measured() -> None:
     blocks = {"wall": {"width": 0.12, "height": 0.12, "length": DEPTH, "material": "smooth"}}
     for rows, measured in ((10, 0.3827), (14, 0.4001), (20, 0.4137)):
         table = column(0.1, 0.1, 0.1 / rows)
-        (text,) = describe(scene(table, blocks=blocks, bodies=[{**WALL, "x": -0.06}])).warnings
+        (text,) = describe(Model(scene(table, blocks=blocks, bodies=[{**WALL, "x": -0.06}]))).warnings
         share = float(text.partition("of its height, ")[2].partition("%")[0])
         assert share == pytest.approx(100.0 * (1.0 - measured / 0.4567), abs=1.0)
 
@@ -168,10 +168,10 @@ TURNS = {"kind": "gravity", "to": "5 deg", "rate": "1 deg/s"}
 @pytest.mark.parametrize("load", [{"kind": "horizontal", "magnitude": 0.1}, TURNS])
 def test_loads_that_soil_does_not_feel_are_warned_of(load: dict[str, Any]) -> None:
     table = column(0.1, 0.1, 0.005)
-    (text,) = describe(scene(table, loads=[{**load, "name": "push"}])).warnings
+    (text,) = describe(Model(scene(table, loads=[{**load, "name": "push"}]))).warnings
     assert text.startswith("loads.push: soil does not feel this load, blocks alone do")
     force = {"kind": "force", "body": "1", "magnitude": 1.0}
-    assert not describe(scene(table, loads=[force])).warnings
+    assert not describe(Model(scene(table, loads=[force]))).warnings
 
 
 SPACING = 0.005
@@ -180,7 +180,7 @@ SCENE = scene(column(0.05, 0.05, SPACING), walls=[LEFT])
 
 def still(**changed: NDArray[np.float64]) -> Track:
     """Return the track of a column that rests for two frames, some quantities of which are changed in the last."""
-    present = SystemInScene(SOILS, SOILS.elements(SCENE))
+    present = SystemInScene(SOILS, SOILS.elements(Model(SCENE)))
     values = np.stack([present.elements.start, present.elements.start])
     track = Track(present, values)
     for name, new in changed.items():
@@ -211,7 +211,7 @@ def test_the_front_ends_at_the_first_gap_and_the_last_particle_is_told_beside_it
     track = still()
     places = track["x"][0].copy()
     places[places > 0.045] += 0.03  # the last column has left
-    moved = final_table(SCENE, still(x=places, vx=np.where(places > 0.045, 1.0, 0.0)))
+    moved = final_table(Model(SCENE), still(x=places, vx=np.where(places > 0.045, 1.0, 0.0)))
     assert moved["soil"] == ["column"]
     assert [moved[name][0] for name in ("left_mm", "right_mm", "first_mm", "last_mm")] == pytest.approx([0, 45, 0, 80])
     assert (moved["back"], moved["at_rest"]) == (["left"], [0.9])
@@ -225,7 +225,7 @@ def test_the_back_of_a_soil_is_the_same_however_little_its_ends_have_moved() -> 
     for walls, back in (([LEFT], "left"), ([end], "right"), ([LEFT, end], "left"), ([], "left")):
         walled = scene(column(0.05, 0.05, SPACING), walls=walls)
         for one_end in (0.0 * apart, np.maximum(apart, 0.0), np.minimum(apart, 0.0)):
-            assert final_table(walled, still(x=places + one_end))["back"] == [back]
+            assert final_table(Model(walled), still(x=places + one_end))["back"] == [back]
 
 
 def test_the_surface_is_the_top_of_columns_and_gaps_interrupt_it() -> None:
@@ -265,7 +265,7 @@ def test_kinetic_energies_of_blocks_add_up_to_that_of_the_ledger(fallen: Result,
     with (tmp_path / "run.csv").open() as file:
         exported = [float(row["kinetic_energy_J"]) for row in csv.DictReader(file)]
     np.testing.assert_array_equal(exported, table.ravel())
-    write_vtkhdf(tmp_path / "run.vtkhdf", frames, fallen.scenario)
+    write_vtkhdf(tmp_path / "run.vtkhdf", frames, Model(fallen.scenario))
     with h5py.File(tmp_path / "run.vtkhdf") as file:
         cells = file["VTKHDF/CellData/kinetic_energy_J"][:].reshape(len(frames), -1)
     np.testing.assert_array_equal(cells[:, :blocks], table)
@@ -299,7 +299,7 @@ def test_ground_and_walls_are_cells_solid_inwards_beyond_all_blocks(golden: Gold
 def test_table_moves_as_the_scenario_says() -> None:
     scenario = load_scenario(SCENARIOS / "shaking_table.toml")
     times = np.linspace(0.0, 0.5, 2001)
-    displacement, velocity = support_motion(scenario, times)
+    displacement, velocity = support_motion(Model(scenario), times)
     assert np.ptp(displacement[:, 0]) > 1e-3
     np.testing.assert_allclose(np.gradient(displacement[:, 0], times)[1:-1], velocity[1:-1, 0], atol=1e-3)
-    assert support_motion(load_scenario(SCENARIOS / "slope.toml"), times)[1].max() == pytest.approx(0.0)
+    assert support_motion(Model(load_scenario(SCENARIOS / "slope.toml")), times)[1].max() == pytest.approx(0.0)
