@@ -174,7 +174,7 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the findings in results/
 
 .PHONY: paper
 paper: $(RUN_STAMP) ## The paper's figures, tables and equations from the shipped scenarios, into results/paper
-	$(VENV_PYTHON) -m blocksim.verification.paper $(PAPER)
+	$(VENV_PYTHON) -m tests.verification.paper $(PAPER)
 
 .PHONY: demo
 demo: $(RUN_STAMP) ## Run the three blocks with contact forces; strip, animation and report in results/demo

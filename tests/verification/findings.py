@@ -17,7 +17,7 @@ from blocksim.analysis.compare import Verdict
 from blocksim.scenario import load_scenario
 from blocksim.study.compare import compare_run
 from blocksim.study.run import run
-from blocksim.verification.paper import markdown
+from tests.verification.paper import markdown
 from tests.verification.reference import with_part
 
 BEGIN = "<!-- findings: written by `make findings` -->"

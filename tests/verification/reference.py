@@ -17,7 +17,7 @@ from blocksim.scenario.models.timeline import IMPULSES
 from blocksim.simulation.files import write_text
 from blocksim.verification.case import Case, Row, Setting, run_case
 from blocksim.verification.cases import CASES, choose_cases, exclusions
-from blocksim.verification.paper import markdown
+from tests.verification.paper import markdown
 
 BEGIN = "<!-- verify: written by `make verify-table` -->"
 END = "<!-- end of verify -->"

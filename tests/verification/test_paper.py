@@ -10,9 +10,9 @@ import pytest
 from blocksim.errors import BlocksimError
 from blocksim.scenario import load_scenario
 from blocksim.simulation.run import simulate
-from blocksim.verification import paper as laws
-from blocksim.verification.paper import COLLAPSES, write_paper
+from tests.verification import paper as laws
 from tests.verification.findings import BEGIN, FINDINGS, STORE, Finding, measure_finding, with_table
+from tests.verification.paper import COLLAPSES, write_paper
 
 SCENARIOS = Path(laws.__file__).parents[2] / "scenarios"
 RESULTS = SCENARIOS.parent / "results"

@@ -4,7 +4,7 @@ Its README.md has Tables 1 to 3, printed values beside those of the scenarios, E
 bounce and a simulated slide, and the pictures. Measurements are those of scenarios/experiments; the results of the
 paper's own simulation are here.
 
-`python -m blocksim.verification.paper FOLDER` runs the shipped scenarios first.
+`python -m tests.verification.paper FOLDER` runs the shipped scenarios first.
 """
 
 import sys
