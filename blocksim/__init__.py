@@ -8,9 +8,10 @@
 True
 
 Scenarios: `load` (a file or dictionaries), `replace` (change keys, validated). Runs: `run`, `open_run`; a result has
-`final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `limit`, `limit_curve`, `static_limit`,
-`capacity`, `fragility`, `calibrate`, `sensitivity`, `converge`. Judging: `compare`. Looking: `plot`, `animate`,
-`report`. Functions have the options of the command of the same name.
+`final`, `frames`, `to_frame()`, `to_xarray()`. A `Model` is what a scenario describes, a `Simulation` is one under way,
+stepped by hand. Studies: `sweep`, `open_sweep`, `limit`, `limit_curve`, `static_limit`, `capacity`, `fragility`,
+`calibrate`, `sensitivity`, `converge`. Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions have the
+options of the command of the same name.
 """
 
 from importlib import import_module
@@ -19,7 +20,8 @@ from typing import TYPE_CHECKING, Any
 from blocksim.notebook import DISPLAYS
 
 if TYPE_CHECKING:
-    from blocksim.scenario import load_scenario as load, replace_values as replace
+    from blocksim.scenario import Model, load_scenario as load, replace_values as replace
+    from blocksim.simulation.loop import Simulation
     from blocksim.study.calibrate import calibrate
     from blocksim.study.capacity import capacity
     from blocksim.study.compare import compare
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.3.0"
 __all__ = [
+    "Model",
+    "Simulation",
     "animate",
     "calibrate",
     "capacity",
@@ -59,6 +63,8 @@ __all__ = [
 # found when first asked for, so that `blocksim --help` need not wait for numba and pandas; as blocksim.study.NAME has
 # them, or another module, under another name
 _HOMES = {
+    "Model": ("scenario", "Model"),
+    "Simulation": ("simulation.loop", "Simulation"),
     "animate": ("study.pictures", "animate"),
     "limit_curve": ("study.limit", "limit_curve"),
     "load": ("scenario", "load_scenario"),

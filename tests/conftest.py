@@ -13,11 +13,11 @@ from hypothesis.internal.conjecture import providers
 
 from blocksim.kernels.common.arrays import World
 from blocksim.scenario import Model, load_scenario
-from blocksim.verification.scene import CaseScene, PaperBlock, Simulation
+from blocksim.verification.scene import CaseScene, PaperBlock, SteppedScene
 from blocksim.world.build import build_world
 from tests import site
 
-__all__ = ["PaperBlock", "Simulation"]  # defined elsewhere, used by all tests
+__all__ = ["PaperBlock", "SteppedScene"]  # defined elsewhere, used by all tests
 
 pytest_plugins = ["tests.golden", "pytester"]  # texts kept in files; pytester for the tests of that
 
@@ -44,7 +44,7 @@ class Start(Protocol):
         contact: Mapping[str, object] = ...,
         time: Mapping[str, object] = ...,
         change: Callable[[World], None] | None = None,
-    ) -> Simulation:
+    ) -> SteppedScene:
         """`change` edits the world before it starts."""
 
 
@@ -65,19 +65,19 @@ def start() -> Start:
         *,
         change: Callable[[World], None] | None = None,
         **values: Any,
-    ) -> Simulation:
+    ) -> SteppedScene:
         return CaseScene(bodies, **values).start(change)
 
     return start_scene
 
 
 @pytest.fixture(scope="session")
-def start_shipped() -> Callable[..., Simulation]:
+def start_shipped() -> Callable[..., SteppedScene]:
     """Start a scenario file that ships, by its name, with other values for some keys."""
 
-    def start_file(name: str, **values: object) -> Simulation:
+    def start_file(name: str, **values: object) -> SteppedScene:
         overrides = {key.replace("__", "."): value for key, value in values.items()}
-        return Simulation(build_world(Model(load_scenario(SCENARIOS / f"{name}.toml", overrides))))
+        return SteppedScene(build_world(Model(load_scenario(SCENARIOS / f"{name}.toml", overrides))))
 
     return start_file
 

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from blocksim.scenario import Model, Scenario, scenario_from_mapping
-from blocksim.simulation.schemes import build, ledger_names
-from blocksim.verification.scene import Simulation
+from blocksim.simulation.schemes import build, ledger_names, measure_row
+from blocksim.verification.scene import SteppedScene
 
 DEPTH = 0.05
 UNIT_WEIGHT = 20e3
@@ -53,7 +53,7 @@ def scene(*soils: dict[str, Any], end: float = 1.0, **changes: Any) -> Scenario:
     return scenario_from_mapping(data_of(*soils, end=end, **changes))
 
 
-class Soil(Simulation):
+class Soil(SteppedScene):
     """A scene with soil under way."""
 
     def __init__(self, scenario: Scenario) -> None:
@@ -88,4 +88,4 @@ class Soil(Simulation):
 
     def entries(self) -> dict[str, float]:
         """Return the entries (J) of the ledger."""
-        return dict(zip(ledger_names(self.scene), self.ledger_row().tolist(), strict=False))
+        return dict(zip(ledger_names(self.scene), measure_row(self.scene).tolist(), strict=False))

@@ -64,7 +64,7 @@ def quantile(probability: float, degrees: int) -> float:
             part = 2.0 * theta / pi if degrees == 1 else 2.0 / pi * (theta + part)
         low, high = (theta, high) if part < abs(2.0 * probability - 1.0) else (low, theta)
     size = sqrt(degrees) * tan(low)
-    return size if probability >= 0.5 else -size  # noqa: PLR2004 - the median
+    return size if probability >= 0.5 else -size
 
 
 def interval(count: int, total: int, confidence: float = CONFIDENCE) -> tuple[float, float]:

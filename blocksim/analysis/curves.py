@@ -32,7 +32,6 @@ FIRST = (CURVES, "replicate")
 TIME = "time"
 STIFF = (0.15, 0.4)  # of the peak, between which the secant is
 FALLEN = 0.8  # of the peak
-LEAST_WAY = 1e-3  # of the farthest point of all curves: less is no way in a direction
 LEAST_SCATTER = 0.02  # of the mean: least standard deviation of what repeats reach
 SINGLE = 0.1  # of the mean: range of a single repeat, where no tolerance is given
 
@@ -218,7 +217,7 @@ def compare_curves(
                 raise InvalidInputError(f"{table.source}: probe '{name}' records no {axis.name}, {known}")
         record = probes[name]
         x, y = (record[axis.name] / axis.factor for axis in (table.x, table.y))
-        least = LEAST_WAY * max(
+        least = 1e-3 * max(  # of the farthest point of all curves: less is no way in a direction
             (float(np.abs(one).max()) for one, _ in [(x, y), *curves.values()] if one.size), default=0.0
         )
         for sense, sign in (("", 1.0), (" back", -1.0)):

@@ -96,11 +96,6 @@ class ExperimentTable:
         return tuple(dict.fromkeys(one.block for one in self.measurements))
 
     @property
-    def replicates(self) -> tuple[int, ...]:
-        """The numbers of the repeats, ascending; a block need not appear in all of them."""
-        return tuple(sorted({one.replicate for one in self.measurements}))
-
-    @property
     def messages(self) -> tuple[str, ...]:
         """Notes for the reader of a comparison: values that are far from the others, and missing ones."""
         warnings = tuple(f"warning: {text}" for text in self.warnings)

@@ -10,8 +10,6 @@ from blocksim.options import silent
 from blocksim.scenario import Model
 from blocksim.study import calibrate, calibrate_plan
 
-TOLD_SECONDS = 2.0
-
 
 def calibrate_command(
     source: prepare.ScenarioInput, options: calibrate_plan.CalibrateOptions, screen: command_line.Screen
@@ -68,7 +66,7 @@ def _trial_lines() -> Callable[[calibrate_plan.Trial, calibrate_plan.Trial, int]
 
     It tells the share inside or, where no trial has any, the distance: 0 at the ranges, towards 1 far from them.
     """
-    is_due = progress.pace(TOLD_SECONDS, 0.0)
+    is_due = progress.pace(2.0, 0.0)
 
     def tell(trial: calibrate_plan.Trial, best: calibrate_plan.Trial, trials: int) -> None:
         if not (is_due() or trial is best or trial.number == trials):

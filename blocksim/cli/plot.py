@@ -148,7 +148,7 @@ def export_command(
     form = FORMATS[kind]
     stored = run_folder.read_run(run)
     contacts = stored.frames.contacts
-    file = out or Path(f"{stored.scenario.name}.{kind}")
+    file = out or Path(f"{stored.model.scenario.name}.{kind}")
     beside = file.with_name(f"{file.stem}_contacts{file.suffix}")
     if file.name in files.OURS and file.resolve().parent == stored.folder.resolve():
         raise OutputExistsError(f"{file}: belongs to the run; choose another name with --out")

@@ -22,7 +22,6 @@ if TYPE_CHECKING:  # stored results are shown without the solver
 T = TypeVar("T")
 FEW = 40  # cases that get a line each
 PLAIN_SECONDS = 2.0
-LIVE_SECONDS = 0.1
 
 
 def pace(seconds: float, since: float | None = None) -> Callable[[], bool]:
@@ -67,7 +66,7 @@ def run_progress(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
     rates = "{task.fields[speed]} steps/s, relative energy error {task.fields[residual]}"
     progress = _bar("{task.completed:.3f} of {task.total:g} s", rates)
     task = progress.add_task("", total=1.0, visible=False, speed="", residual="")
-    is_due = pace(LIVE_SECONDS, 0.0)
+    is_due = pace(0.1, 0.0)
     began: tuple[float, int] | None = None  # time and steps when first shown: it compiles before, and may be resumed
 
     def show(where: "Where") -> None:

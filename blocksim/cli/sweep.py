@@ -1,6 +1,6 @@
 """blocksim sweep: many runs of one scenario, and what it shows: the estimate of --dry-run, and the table."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -73,7 +73,9 @@ def _table_report(result: manifest.SweepResult) -> command_line.Report:
         name for name in table.columns if name not in (*NOT_SHOWN, *SHOWN_LAST) and not name.endswith(NOT_SHOWN_ENDS)
     ]
     columns += [name for name in SHOWN_LAST if name in table]
-    names = [name for name in columns if name in short or name == "inside" or _varies(table[name])]
+    # "finished" in all rows does not vary, nor does a block that stays
+    texts = {name: {f"{one:.2f}" if isinstance(one, float) else str(one) for one in table[name]} for name in columns}
+    names = [name for name in columns if name in (*short, "inside") or len(table) == 1 or len(texts[name]) > 1]
     heads, entries, fitting = _texts(result, names, short)
     if fitting < sum(name not in SHOWN_LAST for name in names):  # the first blocks of many may all stay where they are
         # columns of single blocks behind others, and last what a note below the table tells
@@ -145,9 +147,3 @@ def _failure_lines(result: manifest.SweepResult, short: dict[str, str]) -> Itera
         yield f"  {row['status']}: {values}: {str(row['reason']).splitlines()[0]}"
     if len(failed) > MOST_FAILURES:
         yield f"  and {len(failed) - MOST_FAILURES} more; --retry-failed runs them again"
-
-
-def _varies(values: Iterable[object]) -> bool:
-    """Return True if a column varies: "finished" in all rows does not, nor does a block that stays."""
-    texts = [f"{value:.2f}" if isinstance(value, float) else str(value) for value in values]
-    return len(texts) == 1 or len(set(texts)) > 1

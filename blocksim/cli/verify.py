@@ -83,7 +83,6 @@ def _notes(outcomes: list[case.CaseOutcome]) -> Iterator[str]:
 
 
 QUANTITIES = ("quantity", "unit", "median", "smallest", "largest")
-BENCH_DIGITS = 3
 LARGE = 100.0  # from here on a number has all digits before the point, and else three significant ones
 
 
@@ -142,7 +141,6 @@ def bench_command(
 def _row(found: harness.Number) -> tuple[str, ...]:
     spread = (min(found.samples), max(found.samples)) if len(found.samples) > 1 else (math.nan, math.nan)
     texts = (
-        f"{value:.0f}" if LARGE <= abs(value) < math.inf else case.number(value, BENCH_DIGITS)
-        for value in (found.median, *spread)
+        f"{value:.0f}" if LARGE <= abs(value) < math.inf else case.number(value, 3) for value in (found.median, *spread)
     )
     return f"  {found.quantity}", found.unit, *texts

@@ -8,14 +8,13 @@ from typing import Annotated
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
 from blocksim.options import Option
-from blocksim.scenario import load_stored
+from blocksim.scenario import Model
 from blocksim.simulation import files, schemes
 from blocksim.study import answer, manifest, run, run_folder, sweep, sweep_folder, verify
 
 INDENT = "  "
 MOST_LINES = 5
 LONGEST = 60  # characters of an entry of the provenance
-MOST_WORDS = 12
 UNITS = {  # by the ends of names of quantities; the longer of two that fit first
     "_mm_s": " mm/s", "_deg_s": "°/s", "_mm": " mm", "_deg": "°", "_J": " J", "_s": " s", "_m": " m", "_N": " N"
 }  # fmt: skip
@@ -60,12 +59,12 @@ def _verified(place: Path, threads: int, sample: int, seed: int, screen: command
     try:
         study = answer.study_in(place)
         if study is not None:
-            kernels = [schemes.kernels_of(load_stored(place / study.answer.files.plan))]
+            kernels = [schemes.kernels_of(Model.stored(place / study.answer.files.plan).scenario)]
         else:
             kernels = (
                 [*sweep.kernels_for(sweep_folder.read_plan(place))]
                 if manifest.is_sweep(place)
-                else [schemes.kernels_of(load_stored(run_folder.find_run(place) / files.SCENARIO))]
+                else [schemes.kernels_of(Model.stored(run_folder.find_run(place) / files.SCENARIO).scenario)]
             )
         for one in kernels:
             prepare.announce_compilation(one, quiet=screen.silent)
@@ -187,7 +186,7 @@ def _changes(origins: tuple[verify.OriginDifference, ...]) -> Iterator[str]:
     for one in origins:
         then, now = set(one.then.split()), set(one.now.split())
         change = f"{one.then[:LONGEST]} -> {one.now[:LONGEST]}"
-        if len(then | now) > MOST_WORDS:
+        if len(then | now) > 12:
             words = [f"-{word}" for word in sorted(then - now)] + [f"+{word}" for word in sorted(now - then)]
             change = " ".join(words)
         yield f"changed since: {one.name}: {change}"

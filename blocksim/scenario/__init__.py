@@ -5,7 +5,6 @@ from blocksim.scenario.document import (
     Source,
     document_of,
     load_scenario,
-    load_stored,
     replace_values,
     scenario_from_mapping,
 )
@@ -14,7 +13,7 @@ from blocksim.scenario.models.contact import GROUND
 from blocksim.scenario.models.scenario import Scenario, json_schema
 from blocksim.scenario.models.study import Sweep
 from blocksim.scenario.placement import PlacedBody, PlacedSegment, place_segments
-from blocksim.scenario.resolution import resolve_pair, scenario_hash, scenario_to_toml
+from blocksim.scenario.resolution import resolve_pair, scenario_to_toml
 
 __all__ = [
     "GROUND",
@@ -29,11 +28,9 @@ __all__ = [
     "document_of",
     "json_schema",
     "load_scenario",
-    "load_stored",
     "place_segments",
     "replace_values",
     "resolve_pair",
     "scenario_from_mapping",
-    "scenario_hash",
     "scenario_to_toml",
 ]

@@ -127,7 +127,6 @@ STEEPEST = 5.0
 LIGHTEST, HEAVIEST = 25.0, 25_000.0  # kg/m3: foams and osmium
 SOFTEST = 1e4  # Pa: gels
 LONGEST = 50.0  # m
-LONGEST_DRAWN = 10.0  # m, of most blocks of a drawing: bricks and stones in mm come out larger
 MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the square of the height
 
 
@@ -157,7 +156,7 @@ def implausible_values(scenario: Scenario, placed: Sequence[placement.PlacedBody
     for number, structure in enumerate(scenario.structures):
         if isinstance(structure, polygons.Polygons):
             size = median(dist(*geometry.box_of(one.outline)) for one in structure.cells_given)
-            if size > LONGEST_DRAWN:
+            if size > 10.0:  # m, of most blocks of a drawing: bricks and stones in mm come out larger
                 key = overrides.format_key(("structures", number))
                 warnings.append(f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"')
             warnings += structure.remarks
@@ -294,7 +293,6 @@ def _friction_angles(scenario: Scenario) -> Iterator[str]:
             yield f'{key} = {value:g} is a friction coefficient; for an angle write "{value:g} deg"'
 
 
-MAX_TRIED = 100
 MAX_VARIED = 100
 MODES = get_args(study.Mode)
 ENDS = ("from", "mean", "to")
@@ -320,11 +318,16 @@ def examine(
 
 
 def mistakes_among(
-    data: overrides.Data, scenario: Scenario, placed: Callable[[], placement.Placement], tables: Collection[str]
+    data: overrides.Data,
+    folder: Path,
+    scenario: Scenario,
+    placed: Callable[[], placement.Placement],
+    tables: Collection[str],
 ) -> Iterator[mistakes.Mistake]:
     """Find mistakes in how some tables, each valid, go with the others of a scenario that had none before."""
     if not WITH_NAMES.isdisjoint(tables):
         yield from wrong_names(data)
+    yield from _sweep(data, folder)
     yield from _unknown_provenance(data)
     yield from unfit_choices(scenario)
     yield from start.impossible_starts(scenario, placed, tables)
@@ -372,7 +375,7 @@ def _varied(tried: Trial, key: str, values: object) -> Iterator[mistakes.Mistake
         yield mistakes.Mistake(("sweep", key), complaint, at="key")
         return
     parts = {end: values[end] for end in ENDS if end in values} if isinstance(values, Mapping) else {}
-    for part, value in parts.items() or enumerate(values[:MAX_TRIED] if isinstance(values, tuple) else ()):
+    for part, value in parts.items() or enumerate(values[:100] if isinstance(values, tuple) else ()):
         yield from tried(overrides.parse_key(key), value, ("sweep", key, part))
 
 

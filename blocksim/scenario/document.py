@@ -386,14 +386,6 @@ Source = Path | str | Mapping[str, object] | Scenario | Document
 """What a scenario can be loaded from."""
 
 
-def load_stored(path: Path | str) -> Scenario:
-    """Read and check a scenario in a folder of results, which may come from somebody else: no link is followed.
-
-    Raises as `load_scenario`, and InvalidInputError for a link.
-    """
-    return Document.read(path, is_stored=True).build()
-
-
 def load_scenario(
     source: Source, overrides: Mapping[str, object] | Sequence[str] = (), *, allow_outside: bool = False
 ) -> Scenario:

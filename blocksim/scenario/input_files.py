@@ -166,7 +166,6 @@ def relative_path(path: str) -> str:
 
 LARGEST_FILE = 1_000_000  # bytes
 LONGEST_LINE = 1_000  # characters
-MOST_PROBLEMS_SHOWN = 20
 
 CELLS = {sign: re.compile(rf'[ ]*("(?:[^"]|"")*"|[^"{sign}]*)[ ]*({sign}|$)') for sign in (",", ";")}
 EMPTY = "the table is empty"
@@ -286,7 +285,7 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
 def raise_problems(problems: Sequence[Problem]) -> NoReturn:
     """Raise one InvalidInputError that shows the problems by line; many are cut and counted."""
     by_line = sorted(problems, key=lambda problem: (problem.line_number or 0, problem.caret_start))
-    shown = [problem.render() for problem in by_line[:MOST_PROBLEMS_SHOWN]]
+    shown = [problem.render() for problem in by_line[:20]]
     if len(by_line) > len(shown):
         shown.append(f"... and {len(by_line) - len(shown)} more problems")
     raise InvalidInputError("\n".join(shown))

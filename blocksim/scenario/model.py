@@ -5,10 +5,10 @@ of the rooms above take a model, or the part of it that they need; what takes lo
 `derived` marks it. A varied model validates the tables that have changed, and takes over what follows from the others.
 """
 
-import functools
 from collections.abc import Callable, Collection, Mapping
+from functools import cache, partial
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import pydantic
 
@@ -16,40 +16,49 @@ from blocksim.scenario import check, events, motion as motions, placement as pla
 from blocksim.scenario.document import Document, Source, document_of
 from blocksim.scenario.models import base
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.soil import SoilTable
-from blocksim.scenario.models.timeline import AnyProbe
-from blocksim.scenario.open_faces import ActingLoad, acting_loads
-from blocksim.scenario.placement import GEOMETRY, PlacedBody, PlacedSegment, Placement
+from blocksim.scenario.open_faces import acting_loads
+from blocksim.scenario.placement import GEOMETRY
 
 T = TypeVar("T")
 KEPT_ALONE = Scenario.model_fields.keys() - {"schema_version", "systems", "experiment", "sweep", "provenance"}
 """Tables that are valid or not whatever the others hold; relations between tables are checked afterwards."""
-ANSWERS: list[Callable[["Model"], Any]] = []
+ANSWERS: list["Derived[Any]"] = []
 
 
-def derived(*tables: str) -> Callable[[Callable[["Model"], T]], Callable[["Model"], T]]:
-    """Keep what a function of a model returns in the model; it follows from these tables of the scenario alone.
+class Derived(Generic[T]):
+    """What follows from some tables of a scenario: made once for a model, and kept in it.
 
-    A varied model takes the answer of its origin where none of them has changed.
+    A varied model takes the answer of its origin where none of these tables has changed.
     """
-    follows_from = frozenset(tables)
 
-    def of_function(function: Callable[["Model"], T]) -> Callable[["Model"], T]:
-        @functools.wraps(function)
-        def answer(model: "Model") -> T:
-            origin = model.origin
-            if origin is not None and follows_from.isdisjoint(model.changed):
-                return answer(origin)
-            if answer not in model.kept:
-                model.kept[answer] = function(model)
-            value: T = model.kept[answer]
-            return value
+    def __init__(self, function: "Callable[[Model], T]", tables: Collection[str]) -> None:
+        """Take what makes the answer, and the tables of the scenario that it follows from alone."""
+        self.function, self.tables = function, frozenset(tables)
+        ANSWERS.append(self)
 
-        vars(answer)["follows_from"] = follows_from
-        ANSWERS.append(answer)
+    def __call__(self, model: "Model") -> T:
+        """Return the answer for a model."""
+        if model.origin is not None and self.tables.isdisjoint(model.changed):
+            return self(model.origin)
+        if self not in model.kept:
+            model.kept[self] = self.function(model)
+        answer: T = model.kept[self]
         return answer
 
-    return of_function
+    def __get__(self, model: "Model", _: type) -> T:
+        """Return the answer where it is an attribute of the model."""
+        return self(model)
+
+
+def derived(*tables: str) -> "Callable[[Callable[[Model], T]], Derived[T]]":
+    """Make a function of a model an answer, which follows from these tables of the scenario."""
+    return partial(Derived, tables=tables)
+
+
+HASHED_TEXTS: list[Derived[list[str]]] = [
+    derived(table)(lambda model, table=table: resolution.hashed_texts(model.scenario, table))  # type: ignore[misc]
+    for table in Scenario.model_fields
+]
 
 
 class Model:
@@ -86,7 +95,7 @@ class Model:
         if isinstance(source, Model):
             vars(self).update(vars(source))
             return
-        self.kept: dict[Callable[[Model], Any], Any] = {}  # answers
+        self.kept: dict[Derived[Any], Any] = {}
         self.origin: Model | None = None  # of which this is a variation,
         self.changed: Collection[str] = ()  # by these tables
         self._document: Document | None = None
@@ -95,7 +104,7 @@ class Model:
             return
         self._document = document_of(source)
         self.scenario, placed = self._document.examined()
-        self.kept[Model._placement] = placed
+        self.kept[vars(Model)["placement"]] = placed
 
     @classmethod
     def stored(cls, path: Path) -> Self:
@@ -121,65 +130,30 @@ class Model:
             self._document = document_of(self.scenario)
         return self._document
 
-    @derived(*GEOMETRY)
-    def _placement(self) -> Placement:
-        return places.place(self.scenario)
-
-    @property
-    def placement(self) -> Placement:
-        """All blocks, and the structure or single body that each comes from."""
-        return self._placement()
-
-    @property
-    def bodies(self) -> tuple[PlacedBody, ...]:
-        """All blocks as they are placed: those of structures first, in the order of the file."""
-        return self.placement.bodies
-
-    @property
-    @derived("ground", "walls")
-    def segments(self) -> tuple[PlacedSegment, ...]:
-        """Straight pieces of ground and walls; none of level ground without a profile."""
-        return places.place_segments(self.scenario)
-
-    @property
-    def soils(self) -> list[SoilTable]:
-        """The soils of the scenario."""
-        return places.soil_tables(self.scenario)
-
-    @property
-    @derived(*GEOMETRY, "loads")
-    def acting_loads(self) -> tuple[ActingLoad, ...]:
-        """Loads in the order of the file, those on sides of structures once a face."""
-        return tuple(acting_loads(self.scenario, self.placement))
-
-    @property
-    @derived("motion", "time")
-    def motion(self) -> motions.MotionPieces:
-        """Displacement of the supports over time."""
-        return motions.motion_pieces(self.scenario)
-
-    @property
-    @derived("bodies", "structures", "time", "motion")
-    def drives(self) -> tuple[motions.Drive, ...]:
-        """Motions of driven bodies, in the order of the bodies."""
-        return motions.drives_of(self.scenario)
-
-    @property
-    @derived("probes", "actuators")
-    def probes(self) -> dict[str, AnyProbe]:
-        """All probes by name: those of the file, and one of every actuator."""
-        return events.probes_of(self.scenario)
-
-    @property
-    @derived(*Scenario.model_fields)
-    def implausible_values(self) -> list[str]:
-        """A warning for each value that is hardly meant."""
-        return check.implausible_values(self.scenario, self.bodies)
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 (hex) of all that determines motion and output, as `scenario_hash` has it."""
-        return resolution.hash_of_texts(texts(self) for texts in HASHED_TEXTS)
+    placement = derived(*GEOMETRY)(lambda model: places.place(model.scenario))
+    """All blocks, and the structure or single body that each comes from."""
+    bodies = derived(*GEOMETRY)(lambda model: model.placement.bodies)
+    """All blocks as they are placed: those of structures first, in the order of the file."""
+    segments = derived("ground", "walls")(lambda model: places.place_segments(model.scenario))
+    """Straight pieces of ground and walls; none of level ground without a profile."""
+    soils = derived("systems")(lambda model: places.soil_tables(model.scenario))
+    """The soils of the scenario."""
+    acting_loads = derived(*GEOMETRY, "loads")(lambda model: (*acting_loads(model.scenario, model.placement),))
+    """Loads in the order of the file, those on sides of structures once a face."""
+    motion = derived("motion", "time")(lambda model: motions.motion_pieces(model.scenario))
+    """Displacement of the supports over time."""
+    drives = derived("bodies", "structures", "time", "motion")(lambda model: motions.drives_of(model.scenario))
+    """Motions of driven bodies, in the order of the bodies."""
+    probes = derived("probes", "actuators")(lambda model: events.probes_of(model.scenario))
+    """All probes by name: those of the file, and one of every actuator."""
+    implausible_values = derived(*Scenario.model_fields)(
+        lambda model: check.implausible_values(model.scenario, model.bodies)
+    )
+    """A warning for each value that is hardly meant."""
+    hash = derived(*Scenario.model_fields)(
+        lambda model: resolution.hash_of_texts(texts(model) for texts in HASHED_TEXTS)
+    )
+    """SHA-256 (hex) of all that determines motion and output, whatever the order of the file."""
 
     def varied(self, settings: Mapping[str, object]) -> "Model":
         """Return a model with other values; what follows from other tables of the scenario is shared with this one.
@@ -213,35 +187,28 @@ class Model:
         So messages about mistakes are made in one place.
         """
         moves_end = self.scenario.actuators and tables & {"time", "actuators"}  # which follows from the actuators
-        if moves_end or self.scenario.sweep is not None or not tables <= KEPT_ALONE:
+        if moves_end or not tables <= KEPT_ALONE:
             return None
+        context = {"folder": changed.folder}
+        given = {name: {name: changed.data[name]} if name in changed.data else {} for name in tables}
         try:
             with changed.file_access():
-                parts = {name: _table_of(name, changed) for name in tables}
+                read = {name: _alone(name).model_validate(one, context=context) for name, one in given.items()}
         except pydantic.ValidationError:
             return None
+        parts = {name: getattr(one, name) for name, one in read.items()}
         model = Model(self.scenario.model_copy(update=parts))
         model._document, model.origin, model.changed = changed, self, tables
-        mistakes = check.mistakes_among(changed.data, model.scenario, model._placement, tables)
-        return None if any(True for _ in mistakes) else model
+        with changed.file_access():
+            mistakes = check.mistakes_among(
+                changed.data, changed.folder, model.scenario, lambda: model.placement, tables
+            )
+            return None if any(True for _ in mistakes) else model
 
 
-def _hashed_texts(table: str) -> Callable[[Model], list[str]]:
-    return derived(table)(lambda model: resolution.hashed_texts(model.scenario, table))
-
-
-HASHED_TEXTS = [_hashed_texts(table) for table in Scenario.model_fields]
-
-
-@functools.cache
+@cache
 def _alone(name: str) -> type[base.Table]:
     """Return a table that has one of the fields of a scenario."""
     info = Scenario.model_fields[name]
     fields: dict[str, Any] = {name: (info.annotation, info)}
     return pydantic.create_model("Scenario", __base__=base.Table, **fields)
-
-
-def _table_of(name: str, changed: Document) -> Any:
-    """Return one validated field of a scenario. Raises pydantic's error."""
-    data = {name: changed.data[name]} if name in changed.data else {}
-    return getattr(_alone(name).model_validate(data, context={"folder": changed.folder}), name)

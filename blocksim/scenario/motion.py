@@ -13,7 +13,6 @@ Floats = NDArray[np.float64]
 
 PIECES_PER_CYCLE = 1000
 """Their displacement is off by less than (2 pi/1000)^4/384 = 4e-12 of A/w², their acceleration by 3.3e-6 A."""
-MOST_PIECES = 200_000
 
 
 def pulse_samples(pulse: Pulse) -> tuple[Floats, Floats, Floats]:
@@ -23,7 +22,7 @@ def pulse_samples(pulse: Pulse) -> tuple[Floats, Floats, Floats]:
     cosine v = A/w sin wt, u = A/w² (1 - cos wt); for a rectangle v = A t, u = A t²/2. Cubic pieces through them are
     exact for a rectangle.
     """
-    count = 1 if pulse.shape == "rectangular" else min(MOST_PIECES, math.ceil(PIECES_PER_CYCLE * pulse.resolved_cycles))
+    count = 1 if pulse.shape == "rectangular" else min(200_000, math.ceil(PIECES_PER_CYCLE * pulse.resolved_cycles))
     t = np.linspace(0.0, pulse.resolved_duration, 1 + count)
     w, a = 2.0 * math.pi * pulse.resolved_cycles / pulse.resolved_duration, pulse.amplitude
     if pulse.shape == "rectangular":

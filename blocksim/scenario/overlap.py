@@ -252,7 +252,6 @@ def _expanded(partners: Integers) -> Iterator[Pairs]:
 TOUCHING = 1e-3
 """Of the least width of all blocks: a wider gap is no joint; a block that falls through it lands at some cm/s."""
 CARRIED = -1
-WIDER = 4.0  # times the reach, from one search for the nearest neighbour to the next
 MOST_NAMED = 5
 
 
@@ -289,7 +288,7 @@ def unsupported(scenario: Scenario, placed: Sequence[placement.PlacedBody], near
         least = min(least, float(gaps[labels[one] != labels[other]].min(initial=np.inf)))
         if least <= reach or reach > extent:
             return loose.tolist(), least
-        reach *= WIDER
+        reach *= 4.0  # times the reach, from one search for the nearest neighbour to the next
 
 
 def _spread(labels: Integers, one: Integers, other: Integers) -> Integers:

@@ -132,11 +132,6 @@ def tables_of_bodies(scenario: Scenario) -> dict[int, motion.MotionTable]:
     return {number: one.table for number, one in moved if isinstance(one, motion.FromTable)}
 
 
-def scenario_hash(scenario: Scenario) -> str:
-    """Return the SHA-256 (hex) of everything that determines motion and output, whatever the order of the file."""
-    return hash_of_texts(hashed_texts(scenario, name) for name in type(scenario).model_fields)
-
-
 def hashed_texts(scenario: Scenario, field: str) -> list[str]:
     """Return what a field of a scenario adds to what is hashed, as JSON: keys and their values."""
     texts = deciding_values(scenario, {field}).items()
@@ -146,7 +141,7 @@ def hashed_texts(scenario: Scenario, field: str) -> list[str]:
 
 
 def hash_of_texts(texts: Iterable[Sequence[str]]) -> str:
-    """Return the SHA-256 (hex) of what all fields of a scenario add."""
+    """Return the SHA-256 (hex) of what all fields of a scenario add, whatever the order of the file."""
     return hashlib.sha256(f"{{{','.join(sorted(chain.from_iterable(texts)))}}}".encode()).hexdigest()
 
 

@@ -4,10 +4,8 @@ import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 
-MIN_BEGINNING = 3  # letters that a word needs before a similar word is suggested
 MAX_COMPARED = 1000
 """Known words that a misspelt one is compared with; a file of a million mistakes must not take minutes."""
-MAX_LISTED = 10
 LEAST_SHARE = 0.6  # of letters that two similar words have in common
 ROUND_OFF = 1e-9
 USUAL: Mapping[str, tuple[str, ...]] = {
@@ -69,7 +67,7 @@ def nearest(word: str, known: Iterable[str], most: int) -> str | None:
 def similar_word(word: str, known: Iterable[str]) -> str | None:
     """Return the known word that is most alike, or begins like the given one; of two letters both must be right."""
     known = tuple(islice(known, MAX_COMPARED))
-    if len(word) < MIN_BEGINNING:
+    if len(word) < 3:  # letters that a word needs before a similar word is suggested
         return nearest(word, known, most=0)
     alike = (other for other in known if other.startswith(word) or word.startswith(other))
     return (
@@ -92,7 +90,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"did you mean {similar!r}?" if similar else ""
 
 
-def did_you_mean_or_list(word: str, known: Iterable[object], what: str = "known", most: int = MAX_LISTED) -> str:
+def did_you_mean_or_list(word: str, known: Iterable[object], what: str = "known", most: int = 10) -> str:
     """Suggest the known word that may have been meant, or list the first known words after what they are."""
     names = [str(name) for name in known]
     first = ", ".join(names[:most]) + (", …" if len(names) > most else "")

@@ -111,9 +111,7 @@ def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequen
                 yield f"body {toml(other.name)}"
 
 
-MOST_MEETINGS = 20
 MOST_NAMES = 3
-PLACES_ON_A_WALL = 33
 
 
 def particle_places(soil: SoilTable, placed: Sequence[PlacedBody]) -> NDArray[np.float64]:
@@ -160,7 +158,7 @@ def meetings(soil: SoilTable, key: str, scenario: Scenario, placed: Sequence[Pla
             found.append("another soil of this name")
         elif geometry.overlap(corners, other.corners):
             found.append(f"soil {other.name}")
-    for what in found[:MOST_MEETINGS]:
+    for what in found[:20]:
         yield key, f"soil {soil.name} meets {what}"
 
 
@@ -172,7 +170,7 @@ def _boundaries(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
             yield f"the ground at x = {x:.6g} m"
             return
     segments = placement.place_segments(scenario)
-    places = np.linspace(0.0, 1.0, PLACES_ON_A_WALL)[1:-1, None]
+    places = np.linspace(0.0, 1.0, 33)[1:-1, None]
     for number, piece in enumerate(segments, start=1 - (len(segments) - len(scenario.walls))):
         begin, end = np.array([piece.x0, piece.y0]), np.array([piece.x1, piece.y1])
         back = np.array([piece.y1 - piece.y0, piece.x0 - piece.x1]) / piece.length * 0.5 * soil.spacing
@@ -207,7 +205,7 @@ class Check(NamedTuple):
     """One reason why a scenario cannot start, and the tables that it depends on beside those that place everything."""
 
     find: Callable[[Scenario, Callable[[], Placement]], Iterator[Mistake]]  # places everything only if it has to
-    tables: frozenset[str] = frozenset()
+    tables: Collection[str] = ()
     ends: bool = False  # what follows makes no sense where it finds anything
 
 
@@ -219,7 +217,7 @@ def impossible_starts(
     `placed` places everything, once, if it is asked to.
     """
     for check in CHECKS:
-        mistakes = [*check.find(scenario, placed)] if (check.tables | GEOMETRY).intersection(changed) else []
+        mistakes = [*check.find(scenario, placed)] if GEOMETRY.union(check.tables).intersection(changed) else []
         yield from mistakes
         if mistakes and check.ends:
             return
@@ -235,20 +233,6 @@ def _unfit_structures(scenario: Scenario, placed: Callable[[], Placement]) -> It
                 structure.start(scenario.blocks[structure.block])
             except base.UnfitError as error:
                 yield Mistake(("structures", number, error.key), str(error))
-
-
-def _repeated_names(placed: Placement) -> Iterator[Mistake]:
-    for number in repetitions(body.name for body in placed.bodies):
-        name = toml(placed.bodies[number].name)
-        message = f"two bodies are named {name}; a body without a name is called by its number"
-        yield Mistake((*placed.origins[number], "name"), message)
-
-
-def _unfit_systems(scenario: Scenario, placed: Placement) -> Iterator[Mistake]:
-    for name, tables in scenario.systems.items():
-        for number, table in enumerate(tables):
-            found = table.impossible(scenario, placed.bodies)
-            yield from (Mistake((name, number, key), message) for key, message in found)
 
 
 def _too_many(scenario: Scenario) -> Iterator[Mistake]:
@@ -409,25 +393,34 @@ def _mm(length: float) -> str:
     return f"{length * 1e3:.6g} mm"
 
 
-def _of_placed(find: Callable[[Scenario, Placement], Iterator[Mistake]], *tables: str) -> Check:
-    return Check(lambda scenario, placed: find(scenario, placed()), frozenset(tables))
-
-
+REPEATED = "two bodies are named {}; a body without a name is called by its number"
 CHECKS = (
-    Check(lambda scenario, _: _too_many(scenario), frozenset({"probes"}), ends=True),
+    Check(lambda scenario, _: _too_many(scenario), {"probes"}, ends=True),
     Check(lambda scenario, _: _shapeless(scenario), ends=True),
-    Check(lambda scenario, _: _unfit_tables(scenario), frozenset({"motion", "time", "contact", "pairs"})),
+    Check(lambda scenario, _: _unfit_tables(scenario), {"motion", "time", "contact", "pairs"}),
     Check(_unfit_structures, ends=True),
-    _of_placed(_endless)._replace(ends=True),
-    _of_placed(_unfit_lengths, "contact"),
-    _of_placed(lambda _, placed: _repeated_names(placed)),
-    _of_placed(_overlaps),
-    _of_placed(unfit_loads, "loads", "actuators", "start"),
-    _of_placed(_unfit_systems),
-    _of_placed(lambda scenario, placed: events.unfit_probes(scenario, placed.bodies), "probes", "actuators"),
-    _of_placed(
-        lambda scenario, placed: events.impossible_events(scenario, placed.bodies),
-        *("events", "loads", "actuators", "time"),
+    Check(lambda scenario, placed: _endless(scenario, placed()), ends=True),
+    Check(lambda scenario, placed: _unfit_lengths(scenario, placed()), {"contact"}),
+    Check(
+        lambda _, placed: (
+            Mistake((*placed().origins[number], "name"), REPEATED.format(toml(placed().bodies[number].name)))
+            for number in repetitions(body.name for body in placed().bodies)
+        )
+    ),
+    Check(lambda scenario, placed: _overlaps(scenario, placed())),
+    Check(lambda scenario, placed: unfit_loads(scenario, placed()), {"loads", "actuators", "start"}),
+    Check(
+        lambda scenario, placed: (
+            Mistake((name, number, key), message)
+            for name, tables in scenario.systems.items()
+            for number, table in enumerate(tables)
+            for key, message in table.impossible(scenario, placed().bodies)
+        )
+    ),
+    Check(lambda scenario, placed: events.unfit_probes(scenario, placed().bodies), {"probes", "actuators"}),
+    Check(
+        lambda scenario, placed: events.impossible_events(scenario, placed().bodies),
+        {"events", "loads", "actuators", "time"},
     ),
 )
 """In the order in which mistakes are reported."""

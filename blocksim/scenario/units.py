@@ -82,14 +82,13 @@ _EXPRESSION = re.compile(rf"{_FACTOR}(?:[ ]?[*/·][ ]?{_FACTOR}|[ ]{_FACTOR})*")
 _POWER = re.compile(r"([A-Za-zµμ°])([2-9])\b")
 _PART = re.compile(r"([*/·]?)[ ]?([A-Za-zµμ°_]+[0-9]?)(?:\^(-?[0-9]+))?")
 _SUPERSCRIPTS = str.maketrans({"²": "^2", "³": "^3"})
-_MAX_LENGTH = 40
 LEAST_SHARE = 0.5  # of letters that a unit has in common with one that is suggested for it
 
 
 def parse_unit(text: str) -> Unit:
     """Read a product or quotient of units with whole exponents ("kN/m^3", "m/s²"); raises UnitError."""
     plain = text.translate(_SUPERSCRIPTS).replace("**", "^")
-    if len(plain) > _MAX_LENGTH or not _EXPRESSION.fullmatch(plain):
+    if len(plain) > 40 or not _EXPRESSION.fullmatch(plain):
         raise UnitError
     factor, dimension = Fraction(1), (0, 0, 0, 0)
     for operator, name, exponent in _PART.findall(plain):

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.kernels.common.arrays import zeros
 from blocksim.options import Option
-from blocksim.scenario import Model, Scenario, load_stored, resolution, units
+from blocksim.scenario import Model, Scenario, resolution, units
 from blocksim.simulation import files, instruments, provenance, results
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stores.hdf5 import read_probes, read_rows
@@ -290,7 +290,7 @@ def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
     if not paths:
         path = folder / files.SCENARIO
         try:
-            begun = load_stored(path)
+            begun = Model.stored(path).scenario
         except BlocksimError:  # killed before it was written, or damaged: there is nothing here to lose
             begun = scenario
         _refuse_other(path, "scenario", resolution.deciding_values(begun), resolution.deciding_values(scenario))

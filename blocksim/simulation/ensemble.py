@@ -334,29 +334,27 @@ class Ensemble:
 
     def _run_alone(self, m: int, start: float) -> EnsembleEnd:
         """Go on with a member whose pair list is full, from stop to stop, as `_advance` does."""
-        scene, timeline, last = build.member(self.scenes, m), self.timelines[m], int(self.last_steps[m])
-        code, continues = arrays.REACHED, True
+        scene, last = build.member(self.scenes, m), int(self.last_steps[m])
+        continues = True
         try:
             if not scene.world.clock[0].is_started:
                 scene, _ = schemes.ALONE.advance(self.scheme.with_more_room(scene), 0)
                 start = balance.start_energy(scene)
+            run = loop.Simulation.of(scene, self.placed[m], self.timelines[m], start)
             while continues:
-                done = int(scene.world.clock[0].steps)
+                done = run.steps
                 look = stop = min(balance.next_energy_check(done, self.bodies), last)
                 # frames count until something has moved, and on a support that moves until a block is removed
                 if self.supports[m].moves or not self.watch.first[m]:
                     stop = min(stop, next_frame(done, self.periods[m]))
-                event = loop.NEVER if timeline is None else timeline.next_step(done)
-                scene, code = schemes.ALONE.advance(scene, min(stop, event))
-                if timeline is not None:
-                    scene, code = timeline.act(scene, schemes.ALONE, code)
-                now = int(scene.world.clock[0].steps)
-                is_under_way = code == arrays.REACHED and now < last
-                continues = is_under_way and (now != look or balance.adds_up(balance.energy_ledger(scene, start)))
+                run.step_to(stop)
+                now = run.steps
+                is_under_way = run.code == arrays.REACHED and now < last
+                continues = is_under_way and (now != look or balance.adds_up(run.energy()))
                 if not continues or next_frame(now - 1, self.periods[m]) == now:
-                    motion = blocks.motion_of(build.stack_of_one(scene).world.bodies[[0], : len(self.placed[0])])
+                    motion = blocks.motion_of(build.stack_of_one(run.scene).world.bodies[[0], : len(self.placed[0])])
                     self.watch.follow([m], motion, [now * self.time_steps[m]])
         except BlocksimError as error:
             return MemberFailure(error)
-        measured, watch = schemes.measure_row(scene)[np.newaxis], self.watch.only(m)
-        return member_ends(build.stack_of_one(scene), [self.placed[m]], measured, watch, [start], [code])[0]
+        measured, scenes = schemes.measure_row(run.scene)[np.newaxis], build.stack_of_one(run.scene)
+        return member_ends(scenes, [self.placed[m]], measured, self.watch.only(m), [start], [run.code])[0]

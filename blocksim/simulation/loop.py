@@ -6,20 +6,27 @@ list is made anew, with springs the forces at the same moment too, and what the 
 an entry of its own in the ledger.
 """
 
+import copy
 import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from blocksim.errors import ExitCode
-from blocksim.kernels.common import arrays, tolerances
+from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
+from blocksim.kernels.common import arrays, mechanics, tolerances
 from blocksim.kernels.common.loads import value_at
-from blocksim.scenario import Model, PlacedBody, events
+from blocksim.scenario import Model, PlacedBody, Source, events
 from blocksim.scenario.models.timeline import Event
 from blocksim.simulation import balance, checkpoint, instruments, observables, results, schemes
+from blocksim.simulation.rest_state import initial_scene
+from blocksim.world import systems
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NEVER = np.iinfo(np.int64).max
 NO_SIZE = -1e12  # m: half sides of what is not there: farther than that from everything
@@ -29,6 +36,12 @@ ACCELERATIONS = ("ax", "ay", "spin_rate")
 OF_CONTACTS = ("fx", "fy", "torque", "pairs_now", "pairs_before", "pairs_changed")
 OF_PIECES = ("seats", "coming", "is_asked", "sums_changed")  # see kernels/explicit/inertia.py
 OF_FREE_BODIES = (*NOT_THERE, *RATES, *ACCELERATIONS, *OF_CONTACTS, *OF_PIECES)  # mass, motion and forces
+
+
+class SteppingError(BlocksimError):
+    """A scene cannot be advanced further: a block too fast, contacts lost, energy that does not add up."""
+
+    exit_code = ExitCode.NUMERICAL_FAILURE
 
 
 class Timeline:
@@ -354,19 +367,19 @@ def run_loop(
     """
     run = _Run(scene, recorder, end, team, control, since)
     why = ""
-    while run.status == arrays.REACHED and run.done < run.last and not (run.is_lost or why):
+    while run.code == arrays.REACHED and run.steps < run.last and not (run.is_lost or why):
         why = control.stop()
         if not why:
-            run.advance_towards(min(recorder.next_step(run.done), run.last))
+            run.advance_towards(min(recorder.next_step(run.steps), run.last))
     if why:
         run.write_checkpoint()
     recorder.sample(run.scene)  # wherever it ended
-    ledger = balance.energy_ledger(run.scene, run.start)
-    outcome = Outcome("interrupted", why, ExitCode.STOPPED_EARLY) if why else outcome_of(run.status, ledger)
-    outcome = diagnose(outcome, run.status, run.scene, recorder.placed)
-    overlap, timeline = float(schemes.measure_row(run.scene)[-1]), control.timeline
-    records, pending = ((), ()) if timeline is None else (timeline.records, tuple(timeline.pending))
-    return LoopResult(run.scene, outcome, ledger, run.seconds, team.threads, overlap, run.status, records, pending)
+    ledger = run.energy()
+    outcome = Outcome("interrupted", why, ExitCode.STOPPED_EARLY) if why else outcome_of(run.code, ledger)
+    outcome = diagnose(outcome, run.code, run.scene, recorder.placed)
+    overlap = float(schemes.measure_row(run.scene)[-1])
+    pending = () if run.timeline is None else tuple(run.timeline.pending)
+    return LoopResult(run.scene, outcome, ledger, run.seconds, team.threads, overlap, run.code, run.events, pending)
 
 
 def steps_of_call(before: int, steps: int, seconds: float) -> int:
@@ -379,8 +392,251 @@ def steps_of_call(before: int, steps: int, seconds: float) -> int:
     return max(1, int(min(fitting, MOST_GROWTH * max(steps, before)))) if steps > 0 else before
 
 
-class _Run:
-    """A run under way."""
+@dataclass(frozen=True)
+class KeptMoment:
+    """A moment of a simulation, as `Simulation.copy` keeps and `restore` takes it.
+
+    `bodies` has x, y (m), angle (rad), vx, vy (m/s) and spin (rad/s) of all blocks in order of placement. What is
+    written there is what the scene has after `restore`; the energy that it brings is booked under `events`.
+    """
+
+    bodies: Any  # (n,) record array
+    scene: schemes.AnyScene
+    samples: tuple[tuple[int, tuple[Any, ...]], ...]  # of each probe: step of the last one, and all
+    events: tuple[results.EventRecord, ...]
+    code: int
+
+
+class Simulation:
+    """A scene under way, stepped from Python to the same bits as by `blocksim.run`, wherever calls end.
+
+    Settling before time zero, events, loads, motions and probes are included. Compiled code runs between two calls;
+    nothing of it calls Python.
+
+    Parameters
+    ----------
+    source :
+        A `Model`, or what `blocksim.load` takes.
+    threads :
+        Threads, of use for scenes of 200 blocks and more. Results do not depend on it.
+
+    Raises
+    ------
+    ScenarioError
+        With all mistakes in a scenario.
+    SettleError, SceneTooLargeError, StepError
+        As `blocksim.run`, before the first step.
+
+    Examples
+    --------
+    >>> from blocksim import Simulation, load
+    >>> simulation = Simulation(load("scenarios/slide.toml", {"contact.stiffness_scale": 0.01}))
+    >>> while simulation.bodies.x[0] < 0.02:  # m
+    ...     simulation = simulation.advance(steps=100)
+    >>> round(simulation.time, 2), round(float(simulation.bodies.vx[0]), 2)
+    (0.05, 0.32)
+    """
+
+    model: Model
+    settled: results.RestState | None = None  # how the scene came to rest before time zero, where it did
+    probe_channels: instruments.Probes = instruments.NO_PROBES
+
+    def __init__(self, source: Source | Model, *, threads: int = 1) -> None:
+        """Build the scene and let it settle where the scenario says so; time is zero then."""
+        self.model = model = Model(source)
+        schemes.compile_kernels(schemes.kernels_of(model.scenario))
+        scene = schemes.build(model)
+        step, elements = float(scene.world.controls[0].step), sum(one.count for one in systems.others_of(model))
+        with schemes.team_for(scene, threads, elements) as self.team:
+            scene, self.settled = initial_scene(scene, model, self.team)
+        self.probe_channels = instruments.probes_of(model, step, schemes.ledger_names(scene))
+        self._take(scene, model.bodies, Timeline(model, step), self.team)
+        self.probe_channels.sample(self.scene)
+
+    def _take(
+        self,
+        scene: schemes.AnyScene,
+        placed: Sequence[PlacedBody] = (),
+        timeline: Timeline | None = None,
+        team: schemes.Team = schemes.ALONE,
+        start_energy: float | None = None,
+    ) -> None:
+        """Take a scene that began with so much energy (J), or is to begin now: with its first contacts."""
+        self.scene, self.placed, self.timeline, self.team = scene, placed, timeline, team
+        self.names = tuple(body.name for body in placed)  # of the blocks, in order of placement
+        self.step = float(scene.world.controls[0].step)  # s
+        self.code, self.seconds = arrays.REACHED, 0.0  # s in compiled code
+        self.pace = max(1, BODY_STEPS_AT_FIRST // max(scene.world.bodies.size - 1, 1))
+        if start_energy is None:
+            self._call(0)
+        self.start_energy = balance.start_energy(self.scene) if start_energy is None else start_energy  # J
+
+    @classmethod
+    def of(cls, scene: schemes.AnyScene, placed: Sequence[PlacedBody], timeline: Timeline | None, start: float) -> Self:
+        """Return a scene under way that began with so much energy (J)."""
+        self = cls.__new__(cls)
+        self._take(scene, placed, timeline, start_energy=start)
+        return self
+
+    def _call(self, last_step: int) -> None:
+        """Advance to a step in one compiled call."""
+        self.seconds -= time.perf_counter()
+        self.scene, self.code = self.team.advance(self.scene, last_step)
+        self.seconds += time.perf_counter()
+
+    @property
+    def steps(self) -> int:
+        """Steps since the start."""
+        return int(self.scene.world.clock[0].steps)
+
+    @property
+    def time(self) -> float:
+        """Time (s) since the start."""
+        return self.steps * self.step
+
+    @property
+    def status(self) -> str:
+        """`at rest`, where all blocks have been for as long as the scenario asks, or `under way`."""
+        return "at rest" if self.code == arrays.AT_REST else "under way"
+
+    @property
+    def bodies(self) -> Any:
+        """The blocks at present: x, y (m), angle (rad), vx, vy (m/s), spin (rad/s), a read-only record array.
+
+        They are in order of placement, as `names` has them. It is a view; `copy` keeps a moment.
+        """
+        view = self.scene.world.bodies[: len(self.placed)][list(instruments.MOTION)].view(np.recarray)
+        view.flags.writeable = False
+        return view
+
+    @property
+    def probes(self) -> dict[str, instruments.ProbeSeries]:
+        """Samples so far, by the names of the probes."""
+        return self.probe_channels.series()
+
+    @property
+    def events(self) -> tuple[results.EventRecord, ...]:
+        """Events of the scenario that have happened, with time (s) and energy (J)."""
+        return () if self.timeline is None else self.timeline.records
+
+    def advance(self, *, to: float | None = None, steps: int | None = None) -> Self:
+        """Advance to the step nearest to a time, or by a number of steps; return the simulation.
+
+        A scene at rest goes on as well, and says so by `status`.
+
+        Parameters
+        ----------
+        to :
+            Time (s) since the start, not before the present.
+        steps :
+            How many.
+
+        Raises
+        ------
+        SteppingError
+            Where a run would fail: with the reason, the block and the step.
+        ValueError
+            For none or both, or a time before the present.
+        """
+        if (to is None) == (steps is None):
+            raise ValueError("give either a time (to) or a number of steps")
+        last = self.steps + int(steps) if steps is not None else round(float(to or 0.0) / self.step)
+        if last < self.steps:
+            raise ValueError(f"step {last} is before the present one, {self.steps}: restore a copy")
+        with schemes.Team(self.team.threads) as self.team:
+            while (done := self.steps) < last:
+                due = min(self.probe_channels.next_step(done), balance.next_energy_check(done, len(self.placed)))
+                began = time.perf_counter()
+                self.step_to(min(last, due, done + self.pace))
+                self.pace = steps_of_call(self.pace, self.steps - done, time.perf_counter() - began)
+                self._refuse_failure()
+                self.probe_channels.sample(self.scene)
+        return self
+
+    def step_to(self, last: int) -> None:
+        """Advance to a step, or an event before it, in one compiled call, and let happen what is due there."""
+        done = self.steps
+        self._call(last if self.timeline is None else min(last, self.timeline.next_step(done)))
+        if self.timeline is not None and self.steps > done:
+            self.scene, self.code = self.timeline.act(self.scene, self.team, self.code)
+
+    def _refuse_failure(self) -> None:
+        outcome = outcome_of(self.code, self.energy())
+        if outcome.status == "failed":
+            raise SteppingError(diagnose(outcome, self.code, self.scene, self.placed).reason)
+
+    def contacts(self) -> "pd.DataFrame":
+        """Return the contacts: names of both bodies, place (m), normal, overlap (m), forces (N).
+
+        The normal points from body b to body a; the ground and walls have no name.
+        """
+        import pandas as pd
+
+        rows = schemes.scheme_of(self.scene).contacts(self.scene, len(self.placed))
+        table = pd.DataFrame({name: rows[name] for name in rows.dtype.names or ()})
+        for name in ("body_a", "body_b"):
+            table[name] = [self.names[number] if number >= 0 else "" for number in table[name]]
+        return table
+
+    def energy(self) -> balance.EnergyLedger:
+        """Return where the energy (J) is and went, with the residual."""
+        return balance.energy_ledger(self.scene, self.start_energy)
+
+    def copy(self) -> KeptMoment:
+        """Return the present moment, to be changed or restored; the simulation shares nothing with it."""
+        bodies, samples = (
+            np.array(self.bodies).view(np.recarray),
+            tuple((one.last, tuple(one.rows)) for one in self.probe_channels.all),
+        )
+        return KeptMoment(bodies, copy.deepcopy(self.scene), samples, self.events, self.code)
+
+    def restore(self, moment: KeptMoment) -> Self:
+        """Go to a moment; return the simulation. From one that was not changed it goes on to the same bits.
+
+        Parameters
+        ----------
+        moment :
+            What `copy` returned; its `bodies` may have been changed.
+
+        Raises
+        ------
+        InvalidInputError
+            For numbers that are not finite, and for changes of a block that is not free. Nothing is changed then.
+        """
+        scene = copy.deepcopy(moment.scene)
+        bodies = scene.world.bodies[: len(self.placed)]
+        is_changed = np.any([moment.bodies[name] != bodies[name] for name in instruments.MOTION], axis=0)
+        for number in np.flatnonzero(is_changed):
+            if not bodies[number].inverse_mass > 0.0:
+                raise InvalidInputError(f"body {self.names[number]} is not free: what holds or drives it moves it")
+            if not np.isfinite(moment.bodies[number].tolist()).all():
+                raise InvalidInputError(f"body {self.names[number]}: places and velocities have to be finite numbers")
+        self.scene, self.code = scene, moment.code
+        if self.timeline is not None:
+            self.timeline.records = moment.events
+        for channel, (last, rows) in zip(self.probe_channels.all, moment.samples, strict=True):
+            channel.last, channel.rows = last, [*rows]
+        if is_changed.any():
+            self._change(moment.bodies, is_changed)
+        return self
+
+    def _change(self, values: Any, is_changed: NDArray[np.bool_]) -> None:
+        """Write blocks as they were changed, have contacts evaluated anew, and book the energy."""
+        world, before = self.scene.world, balance.start_energy(self.scene)
+        old = world.bodies.copy()
+        for name in instruments.MOTION:
+            world.bodies[: len(self.placed)][name][is_changed] = values[name][is_changed]
+        mechanics.renew_rotations(world.bodies)
+        world.clock["rebuilds"] = world.clock["checks_at_rest"] = 0
+        self.code = arrays.REACHED
+        if schemes.scheme_of(self.scene).after_event(self.scene, old):
+            self._call(self.steps)
+        self.scene.world.ledger[0].events += before - balance.start_energy(self.scene)
+        self._refuse_failure()
+
+
+class _Run(Simulation):
+    """A run: a simulation with frames, checkpoints and whatever stops it."""
 
     def __init__(
         self,
@@ -392,51 +648,39 @@ class _Run:
         since: checkpoint.Position | None,
     ) -> None:
         """Evaluate the contacts at the start, or take over what an earlier part of the run has left."""
-        self.scene, self.recorder, self.end, self.team, self.control = scene, recorder, end, team, control
-        self.step = float(scene.world.controls[0].step)
-        self.last = last_step_of(end, self.step)
-        self.bodies = scene.world.bodies.size - 1
-        self.pace = max(1, BODY_STEPS_AT_FIRST // max(self.bodies, 1))
-        self.status, self.is_lost = arrays.REACHED, False
-        self.seconds = self.start = 0.0  # in compiled code; J
-        self.timeline = control.timeline
+        self.recorder, self.end, self.control = recorder, end, control
+        self._take(scene, recorder.placed, control.timeline, team, None if since is None else since.start_energy)
+        self.last, self.is_lost = last_step_of(end, self.step), False
         if since is not None:
-            self.start, self.seconds = since.start_energy, since.solver_seconds
+            self.seconds = since.solver_seconds
             if self.timeline is not None:
                 self.timeline.records = since.events
             return
-        self._advance(0)
-        self.start = balance.start_energy(self.scene)
         self.recorder.sample(self.scene)
         self.recorder.probes.sample(self.scene)
 
-    @property
-    def done(self) -> int:
-        """Return the number of steps done."""
-        return int(self.scene.world.clock[0].steps)
-
     def advance_towards(self, wanted: int) -> None:
         """Advance towards a step at which a frame is wanted, as far as one call goes."""
-        done, before = self.done, time.perf_counter()
-        look = balance.next_energy_check(done, self.bodies)
+        done, before = self.steps, time.perf_counter()
+        look = balance.next_energy_check(done, self.scene.world.bodies.size - 1)
         event = wanted if self.timeline is None else self.timeline.next_step(done)
         checkpoints = self.control.checkpoints
         due = checkpoint.NEVER if checkpoints is None else checkpoints.next_step(done)
         self._advance_by_probes(min(wanted, look, event, done + self.pace, due))
-        self.pace = steps_of_call(self.pace, self.done - done, time.perf_counter() - before)
+        self.pace = steps_of_call(self.pace, self.steps - done, time.perf_counter() - before)
         if self.timeline is not None:
-            self.scene, self.status = self.timeline.act(self.scene, self.team, self.status)
+            self.scene, self.code = self.timeline.act(self.scene, self.team, self.code)
         self.recorder.probes.sample(self.scene)  # like frames after what happens at this step
         if self.recorder.probes.all and self.recorder.sink is not None:
             self.recorder.sink.keep_up()  # with the samples
-        if self.done == wanted:
+        if self.steps == wanted:
             self.recorder.sample(self.scene)
-        ledger = balance.energy_ledger(self.scene, self.start)
-        self.is_lost = self.done == look and not balance.adds_up(ledger)
-        is_sound = self.status == arrays.REACHED and balance.adds_up(ledger) and self.done < self.last
-        if is_sound and checkpoints is not None and checkpoints.is_due(self.done):
+        ledger = self.energy()
+        self.is_lost = self.steps == look and not balance.adds_up(ledger)
+        is_sound = self.code == arrays.REACHED and balance.adds_up(ledger) and self.steps < self.last
+        if is_sound and checkpoints is not None and checkpoints.is_due(self.steps):
             self.write_checkpoint()
-        self.control.on_progress(Progress(self.done * self.step, self.end, self.done, ledger.relative_residual))
+        self.control.on_progress(Progress(self.steps * self.step, self.end, self.steps, ledger.relative_residual))
 
     def _advance_by_probes(self, last_step: int) -> None:
         """Advance to a step in one call, or in several where probes are to be sampled on the way.
@@ -445,31 +689,26 @@ class _Run:
         """
         probes, began = self.recorder.probes, time.perf_counter()
         if not probes.all:
-            self._advance(last_step)
+            self._call(last_step)
             return
-        while self.status == arrays.REACHED and self.done < last_step:
-            self._advance(min(last_step, probes.next_step(self.done)))
+        while self.code == arrays.REACHED and self.steps < last_step:
+            self._call(min(last_step, probes.next_step(self.steps)))
             if time.perf_counter() - began > LONGEST_CALL:
                 return
-            if self.status == arrays.REACHED and self.done < last_step:
+            if self.code == arrays.REACHED and self.steps < last_step:
                 probes.sample(self.scene)
-
-    def _advance(self, last_step: int) -> None:
-        self.seconds -= time.perf_counter()
-        self.scene, self.status = self.team.advance(self.scene, last_step)
-        self.seconds += time.perf_counter()
 
     def write_checkpoint(self) -> None:
         """Keep the present state, before the frame of a moment that is no output time is recorded."""
         if self.control.checkpoints is None:
             return
         position = checkpoint.Position(
-            step=self.done,
-            frames=self.recorder.count_until(self.done),
-            frames_sha256=self.recorder.digest_until(self.done),
-            start_energy=self.start,
+            step=self.steps,
+            frames=self.recorder.count_until(self.steps),
+            frames_sha256=self.recorder.digest_until(self.steps),
+            start_energy=self.start_energy,
             solver_seconds=self.seconds,
             threads=self.team.threads,
-            events=() if self.timeline is None else self.timeline.records,
+            events=self.events,
         )
         self.control.checkpoints.write(self.scene, position)

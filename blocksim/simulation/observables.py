@@ -393,10 +393,6 @@ class Movement(BaseModel, frozen=True, extra="allow"):
         (values,) = observe(ends, [one.name for one in OBSERVABLES.values() if one.in_runs])
         return cls(**values) if values else None
 
-    def without_outcome(self) -> "Movement":
-        """Return those of a run that failed: what it would have come to is not known."""
-        return type(self)(**{**self.values, OUTCOME: None})
-
     @model_validator(mode="after")
     def _check(self) -> Self:
         """Refuse what people are told of a run where it is not there, or is no number."""

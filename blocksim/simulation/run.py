@@ -254,7 +254,8 @@ def _result(
     if movement is not None:
         outcome = loop.after_a_fall(ended.outcome, ended.code, ended.ledger, movement.values[observables.OUTCOME])
         ended = replace(ended, outcome=outcome)
-        movement = movement if outcome.status != "failed" else movement.without_outcome()
+        if outcome.status == "failed":  # what it would have come to is not known
+            movement = observables.Movement(**{**movement.values, observables.OUTCOME: None})
     outcome = ended.outcome
     summary = results.Summary(
         name=scenario.name,

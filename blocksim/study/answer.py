@@ -18,7 +18,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.notebook import Shown
-from blocksim.scenario import Scenario, input_files, load_stored
+from blocksim.scenario import Model, Scenario, input_files
 from blocksim.study.sweep_folder import FolderKind, write_answer
 from blocksim.view.report.subjects import StudyPage
 from blocksim.view.style import OWN, Paper
@@ -195,7 +195,7 @@ def draw_study(folder: Path, study: Study, options: "PlotOptions") -> Path:
         takers = [one.files.what for one in (load_study(name).answer for name in STUDIES) if one.takes_table]
         message = f"{published}: a table is drawn beside {takers[0]} only, and {folder} is {kind.files.what}"
         raise InvalidInputError(message)
-    scenario = load_stored(folder / kind.files.plan)
+    scenario = Model.stored(folder / kind.files.plan).scenario
     path = options.picture(f"{scenario.name}_{kind.picture}.png")
     answer = kind.read(folder).model_copy(update={"beside": published})
     answer.draw(path, title_of(scenario), options.paper)

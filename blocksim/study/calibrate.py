@@ -14,7 +14,7 @@ import tomli_w
 from blocksim.errors import BlocksimError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.extras import load_module
 from blocksim.options import takes
-from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash, scenario_to_toml
+from blocksim.scenario import Document, Model, Scenario, Source, document_of, scenario_to_toml
 from blocksim.scenario.document import locate
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.overrides import KeyPath, follow, format_key, with_value
@@ -65,7 +65,7 @@ def scenario_text(
         text = f"# {head}\n{text}"
         found = replace(Document.parse(text, folder=folder), allow_outside=True).build()
         same = [one.model_copy(update={"motion": None}) for one in (found, scenario)]  # the hash has its content
-        if scenario_hash(found) == scenario_hash(scenario) and same[0] == same[1]:
+        if Model(found).hash == Model(scenario).hash and same[0] == same[1]:
             return text
     experiment, motion = (follow(data, path) for path in TABLES[:2])
     resolved = scenario_to_toml(

@@ -19,7 +19,7 @@ from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, OutputError, OutputExistsError, Problem, ScenarioError
 from blocksim.extras import load_module
 from blocksim.options import Option, silent
-from blocksim.scenario import Document, Model, Scenario, Sweep, input_files, overrides, scenario_hash, units
+from blocksim.scenario import Document, Model, Scenario, Sweep, input_files, overrides, units
 from blocksim.scenario.models.study import Normal, Uniform, toml_number
 from blocksim.simulation import files, provenance
 from blocksim.study import compare, plan as plans
@@ -163,7 +163,7 @@ class CalibrationPlan:
     def fingerprint(self) -> dict[str, object]:
         """Return all that decides a trial: trials in a journal belong to this plan if theirs is the same."""
         return {
-            "scenario": scenario_hash(self.base),
+            "scenario": Model(self.base).hash,
             "priors": [str((one.key, one.low, one.high, one.unit, one.log)) for one in self.priors],
             "scatter": None if self.scatter is None else str(self.scatter.as_table()),
             "experiment": files.sha256_of(Path(self.table.source)),

@@ -11,7 +11,7 @@ from blocksim.analysis.experiment import has_curves, load_table
 from blocksim.analysis.metrics import Judgement, Settings, judge
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.options import Option
-from blocksim.scenario import Model, load_scenario, load_stored
+from blocksim.scenario import Model, load_scenario
 from blocksim.simulation import Result, files, results
 from blocksim.study import manifest, rows, run_folder, sweep_folder
 
@@ -70,7 +70,7 @@ def compare_sweep(
     """
     result = sweep if isinstance(sweep, manifest.SweepResult) else manifest.read_sweep(Path(sweep))
     plan = result.folder / sweep_folder.PLAN
-    scenario = load_stored(plan) if plan.exists() else None
+    scenario = Model.stored(plan).scenario if plan.exists() else None
     table = experiment or (scenario.experiment.table if scenario is not None and scenario.experiment else None)
     if table is None:
         message = f"{result.folder}: the sweep's scenario names no experiment; give a table with --experiment"

@@ -23,7 +23,7 @@ from blocksim.study.answer import UnstoredResult
 from blocksim.study.capacity import CapacityAnswer
 from blocksim.view import style
 from blocksim.view.kinds import CAPACITY, FINAL, MOTION
-from blocksim.view.report import page
+from blocksim.view.report import page, subjects
 from blocksim.world.systems import others_of
 from blocksim.world.systems.blocks import block_system
 
@@ -189,7 +189,8 @@ def page_of(shown: Any, *, experiment: Path | str | None = None) -> PageDisplay:
     if isinstance(subject, Result):
         return PageDisplay(report.page_of_result(subject, table))
     if isinstance(subject, UnstoredResult):
-        return PageDisplay(report.page_of_study(subject))
+        part = subjects.study_subject("part-1", answer.page_of(subject, subject.scenario), "")
+        return PageDisplay(page.page_text([part]))
     parts, problems = report.subjects_of([subject], table)
     if problems:
         raise InvalidInputError("\n".join(problems))

@@ -52,12 +52,11 @@ from blocksim.study import limit_answer, limit_plan, manifest, sweep, sweep_fold
 from blocksim.study.answer import Study, without_cases
 from blocksim.study.criterion import Stability, falls_before_zero
 from blocksim.study.executors import Execution, ensemble
-from blocksim.study.limit_plan import Change, LimitPlan, Number
+from blocksim.study.limit_plan import Change, LimitPlan, Number, moves_supports
 from blocksim.study.rows import FINISHED, Head, Row
 from blocksim.world.interactions import contact_classes, interactions_of
 
 SHIFT = 2.5e-3  # share of a limit by which springs may shift it unasked: half of what is warned of, as it is foretold
-MOST_LEVELS = 4  # stiffnesses
 MOST_PICTURED = 3  # brackets whose sides are kept
 SHARPER = 0.8  # of the tolerance: what is extrapolated from two brackets is wider than the narrower one
 HALF = 0.5
@@ -204,7 +203,7 @@ def extrapolate_limit(softer: float, stiffer: float, ratio: float) -> float:
 
 def can_be_stiffer(plan: LimitPlan) -> bool:
     """Return True for springs, unless the key is one of stiffness or a system has its own, or whole numbers only."""
-    has_springs = plan.scenario.time.has_springs and not plan.scenario.systems
+    has_springs = plan.model.scenario.time.has_springs and not plan.model.scenario.systems
     return has_springs and not plan.span.is_whole and not any(part in plan.key for part in OF_STIFFNESS)
 
 
@@ -212,7 +211,7 @@ def refuse_without_springs(*plans: LimitPlan) -> None:
     """Raise InvalidInputError where none of the plans can be searched with stiffer springs."""
     if any(can_be_stiffer(plan) for plan in plans):
         return
-    if not any(plan.scenario.time.has_springs for plan in plans):
+    if not any(plan.model.scenario.time.has_springs for plan in plans):
         scheme = f"time.scheme {timeline.SPRINGS}"
         raise InvalidInputError(f"rigid contacts have no stiffness: --stiffer is for springs ({scheme})")
     springs = limit_plan.NAMES[timeline.SPRINGS]
@@ -228,7 +227,7 @@ class StandingSide:
         self.value = change.high if change.below is Stability.FALLS else change.low
         self.model, row = plan.model_at(self.value), rows[self.value]
         self.give: limit_answer.Give | None = None  # how far springs have given way, where what stands there says so
-        if plan.scenario.time.has_springs and row.get("outcome") == STANDS:  # what rocked back has turned too
+        if plan.model.scenario.time.has_springs and row.get("outcome") == STANDS:  # what rocked back has turned too
             turn = max(abs(float(str(row[name]))) for name in row if name.endswith(".rotation_deg"))
             # of the load k that topples a block by k g along the ground, atan k = a, a turn d takes away 2 d/sin(2 a) k
             slope = (float(self.model.scenario.ground.tilt) or math.inf) if plan.key == TILT else 0.5
@@ -266,12 +265,12 @@ class StandingSide:
             elif is_coefficient and not plan.unit:
                 load = min(abs(self.value), 1.0) or 1.0
             rest = rest / scenario.gravity / load
-        if as_given or not plan.scenario.time.has_springs:
+        if as_given or not plan.model.scenario.time.has_springs:
             return limit_answer.Margin(rest=rest, springs=0.0)
         if levels is not None:
             is_known = levels.stiff is not None or levels.problem
             return limit_answer.Margin(rest=rest, springs=0.0 if is_known else BEYOND * probed)
-        if plan.moves_supports:  # nothing says by how much
+        if moves_supports(plan.model):  # nothing says by how much
             return limit_answer.Margin(rest=rest, springs=0.0)
         return limit_answer.Margin(rest=rest, springs=self.most_shift if self.give is None else self.give.share)
 
@@ -328,7 +327,7 @@ class _Search:
                 changes = [(one.below, one.above) for one in limit_plan.changes_in(verdicts)]
                 if values or changes == [(near.below, near.above)]:
                     return values
-            known = rows.items() if plan.moves_supports else ()  # a value may fall between others that stand
+            known = rows.items() if moves_supports(plan.model) else ()  # a value may fall between others that stand
             peaks = {at: float(str(row[observables.PEAK])) for at, row in known if observables.PEAK in row}
             return limit_plan.next_values(plan.span, plan.verdicts(rows), plan.tolerance, peaks)
 
@@ -396,9 +395,9 @@ class _Search:
         side = StandingSide(plan, change, rows)
         least, levels, half = max(SHIFT, plan.tolerance), None, None
         if is_corrected and can_be_stiffer(plan):
-            is_needed = self.stiffer or (not plan.moves_supports and side.most_shift > least)
+            is_needed = self.stiffer or (not moves_supports(plan.model) and side.most_shift > least)
             levels = self._levels(side, least) if is_needed else None
-        elif is_corrected and not plan.scenario.time.has_springs and not plan.key.startswith("time."):
+        elif is_corrected and not plan.model.scenario.time.has_springs and not plan.key.startswith("time."):
             half = self._half(change)
         margin = side.margin(levels, least, as_given=not is_corrected)
         give = side.give if {change.below, change.above} == limit_answer.LIMIT else None
@@ -474,7 +473,7 @@ class _Search:
             (given,), laws.LAWS[scenario.contact.law].compression(1.0, RATIO), is_at_rest=motion.settles(scenario)
         )
         share = side.give.share if side.give is not None else 0.0
-        while levels.is_far and len(levels.levels) < MOST_LEVELS:
+        while levels.is_far and len(levels.levels) < 4:  # stiffnesses
             scale *= RATIO
             is_foretold = len(levels.levels) > 1 or share > least
             if is_foretold:

@@ -17,7 +17,7 @@ from blocksim.scenario.input_files import raise_problems, read_table
 from blocksim.simulation.observables import PEAK, Response, table_columns
 from blocksim.study.answer import Answer, Overview, with_unit
 from blocksim.study.criterion import Stability
-from blocksim.study.limit_plan import MOST_SCANNED, NAMES, Change, LimitPlan, Number
+from blocksim.study.limit_plan import MOST_SCANNED, NAMES, Change, LimitPlan, Number, moves_supports
 from blocksim.study.rows import Head, Row, as_cell
 from blocksim.study.run_folder import read_run
 from blocksim.study.sweep_folder import CASES, FolderKind, case_folder
@@ -242,7 +242,7 @@ class LimitAnswer(RangeAnswer, frozen=True):
         statics: Mapping[str, object] | None = None,
     ) -> Self:
         """Make the answer of a search; `stiffer` has rows by stiffness scale, `finer` by time step (s)."""
-        scenario = plan.scenario
+        scenario = plan.model.scenario
         scale = scenario.contact.stiffness_scale if scenario.time.has_springs else None
         columns = [*table_columns(), PEAK, "status", "reason", "seconds"]
         searches = [
@@ -316,7 +316,7 @@ class LimitAnswer(RangeAnswer, frozen=True):
         if plan is not None and Stability.UNDECIDED in plan.verdicts(self.rows).values():
             notes.append("undecided: blocks were still moving at the end; increase time.end to decide")
         notes += self.warnings()
-        if plan is not None and not self.is_whole and (plan.scenario.motion is not None or not self.brackets):
+        if plan is not None and not self.is_whole and (plan.model.scenario.motion is not None or not self.brackets):
             notes.append(self.unseen)
         notes.append(f"{self.runs} runs, {self.run} of them now: {self.folder / 'limit.csv'}")
         if any({one.below.value, one.above.value} <= self.case_folders.keys() for one in self.falls):
@@ -365,8 +365,8 @@ class LimitAnswer(RangeAnswer, frozen=True):
         """Return what springs do to limits that are not those of stiff contacts, and that the search was cut short."""
         found = [text for one in self.brackets for text in one.warnings(self.unit, is_as_given=self.is_as_given)]
         plan = self.plan
-        is_open = plan is not None and plan.moves_supports and plan.scenario.time.has_springs and not self.is_as_given
-        if is_open and self.falls and not any(one.levels for one in self.brackets):
+        is_open = plan is not None and moves_supports(plan.model) and plan.model.scenario.time.has_springs
+        if is_open and self.falls and not (self.is_as_given or any(one.levels for one in self.brackets)):
             found.append("with moving supports the effect of contact stiffness is not estimated; --stiffer computes it")
         if self.is_cut:
             found.append(f"warning: stopped after {self.runs} runs; --most-runs above {self.most_runs} continues")

@@ -23,7 +23,7 @@ from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.options import Option, Overwrite, silent, takes
-from blocksim.scenario import Document, Model, Scenario, overlap, overrides, units
+from blocksim.scenario import Document, Model, overlap, overrides, units
 from blocksim.scenario.models import study, timeline
 from blocksim.scenario.models.loads import stretches_of
 from blocksim.scenario.placement import smallest_width
@@ -50,7 +50,6 @@ HALVINGS = 2  # of the spacing of a scan, beside a peak
 OUTWARD = 2.0  # widths of what is known, by which a search near a value goes on beyond it
 FLOOR = 1e-6  # of the range: brackets about zero get no narrower
 NEAR = 0.01  # of the smallest side of a block: what is farther from all that carries it is to drop
-SCANNED = 9
 MOST_SCANNED = MOST_VALUES = 1000
 MOST_RUNS = 100  # of a search; a round more may cost minutes
 TOLERANCE = 1e-3
@@ -284,15 +283,15 @@ def next_near(span: SearchRange, known: Mapping[Number, Kind], near: Change[Kind
 def has_passed(model: Model) -> bool:
     """Return True where less acts on blocks at the end than before, so that what rocks then may come to rest yet."""
     scenario = model.scenario
-    if moves_supports(scenario) or any(body.vx or body.vy or body.spin for body in model.bodies):
+    if moves_supports(model) or any(body.vx or body.vy or body.spin for body in model.bodies):
         return True
     values = ([abs(one.value) for one in stretches_of(load, scenario.ground.tilt)] for load in scenario.loads)
     return any(max(of_load) > of_load[-1] for of_load in values)
 
 
-def moves_supports(scenario: Scenario) -> bool:
+def moves_supports(model: Model) -> bool:
     """Return True where the ground or driven bodies move, so that what falls may stand at a value beyond."""
-    return scenario.motion is not None or any(body.motion is not None for body in scenario.bodies)
+    return model.scenario.motion is not None or any(body.motion is not None for body in model.scenario.bodies)
 
 
 def is_sustained(model: Model) -> bool:
@@ -349,16 +348,6 @@ class LimitPlan:
     def model(self) -> Model:
         """What the document describes."""
         return Model(self.document)
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario of the document."""
-        return self.model.scenario
-
-    @property
-    def moves_supports(self) -> bool:
-        """Whether the ground or driven bodies move."""
-        return moves_supports(self.scenario)
 
     @property
     def usual_runs(self) -> int:
@@ -441,7 +430,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
     if not isinstance(table, Mapping) or not {"from", "to"} <= set(table):
         message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"
         raise InvalidInputError(message)
-    count = table.get("count", SCANNED if options.scan is None else options.scan)
+    count = table.get("count", 9 if options.scan is None else options.scan)
     if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_SCANNED:
         raise InvalidInputError(f"{count} values cannot be scanned; a whole number from 2 to {MOST_SCANNED} is needed")
     ends: dict[str, Any] = {name: table[name] for name in table if name != "count"}
@@ -463,9 +452,9 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
         except BlocksimError as error:
             message = f"{key} = {answer.with_unit(number, unit)}: {str(error).splitlines()[0]}"
             raise InvalidInputError(message) from error
-    if options.stands is None and plan.moves_supports:
+    if options.stands is None and moves_supports(plan.model):
         stands = criterion.read_criterion(criterion.OF_MOVING_SUPPORTS)
-    stops_at_rest = plan.scenario.time.stop_at_rest and not plan.moves_supports
+    stops_at_rest = plan.model.scenario.time.stop_at_rest and not moves_supports(plan.model)
     judge = replace(stands, has_passed=any(map(has_passed, at_ends)), stops_at_rest=stops_at_rest)
     plan = replace(plan, criterion=judge)
     start = bare.data.get("start")

@@ -29,7 +29,6 @@ from blocksim.view.report import page, subjects
 
 HOST = "127.0.0.1"
 LAST_SECONDS = 3.0  # after the end of a run, in which an open page fetches the last frame
-WAIT_SECONDS = 0.2  # for a request, before the end is looked for
 PATIENCE = 30.0  # s for a server to start, and to end after LAST_SECONDS; it may be stopped, and is killed then
 HEADERS = (("Cache-Control", "no-store"), ("X-Content-Type-Options", "nosniff"), ("Referrer-Policy", "no-referrer"))
 Start = Callable[[str, list[tuple[str, str]]], object]
@@ -94,9 +93,9 @@ class LivePage:
         return {
             "version": version,
             "ended": (self.folder / files.SUMMARY).is_file(),
-            "name": run.scenario.name,
+            "name": run.model.scenario.name,
             "time": float(run.frames.time[-1]),
-            "end": run.scenario.time.end,
+            "end": run.model.scenario.time.end,
             "kinetic": None if kinetic is None else float(kinetic[-1]),
             "frames": len(run.frames),
         }
@@ -143,7 +142,7 @@ def open_server(folder: Path) -> Iterator[tuple[WSGIServer, LivePage, str]]:
     """Give a server of a run's folder on a free port of the loopback address, its answers, and its address."""
     answers = LivePage(folder)
     with make_server(HOST, 0, answers, _Server, _Silent) as server:
-        server.timeout = WAIT_SECONDS
+        server.timeout = 0.2  # for a request, before the end is looked for
         yield server, answers, f"http://{HOST}:{server.server_port}{answers.place}/"
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from blocksim.errors import BlocksimError, InvalidInputError, OutputError, OutputExistsError
 from blocksim.notebook import Shown
-from blocksim.scenario import load_stored
+from blocksim.scenario import Model
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, refuse_large
 from blocksim.simulation import files, observables, provenance
 from blocksim.study import plan, rows, sweep_folder
@@ -353,7 +353,7 @@ def read_sweep(folder: Path | str) -> SweepResult:
 def planned_in(folder: Path) -> int | None:
     """Return how many cases the plan in a folder has; None where no plan is there that this version reads."""
     with suppress(BlocksimError):
-        sweep = load_stored(folder / sweep_folder.PLAN).sweep
+        sweep = Model.stored(folder / sweep_folder.PLAN).scenario.sweep
         if sweep is not None:
             return sweep.samples if sweep.is_sampled else len(plan.design_of(sweep))  # without drawing them
     return None

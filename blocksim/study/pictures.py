@@ -14,7 +14,7 @@ from blocksim.analysis.evidence import Members
 from blocksim.analysis.experiment import ExperimentTable, has_curves, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.options import Option, Replace, silent, takes
-from blocksim.scenario import Model, Scenario, input_files, load_scenario, load_stored, overrides, spelling, units
+from blocksim.scenario import Model, Scenario, input_files, load_scenario, overrides, spelling, units
 from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.simulation import files
 from blocksim.study import answer, capacity, compare, manifest, run_folder, sweep_folder
@@ -50,7 +50,7 @@ def read_sweep_data(folder: Path, experiment: Path | str | None = None) -> Sweep
     """
     sweep = manifest.read_sweep(folder)
     table = sweep.table
-    scenario = load_stored(folder / sweep_folder.PLAN)
+    scenario = Model.stored(folder / sweep_folder.PLAN).scenario
     blocks = tuple(name.removesuffix(X) for name in map(str, table.columns) if name.endswith(X))
     finished = (table["status"] == FINISHED).to_numpy(dtype=bool)
     if not blocks or not finished.any():
@@ -336,7 +336,7 @@ def draw_run(find: Callable[[], run_folder.StoredRun], options: PlotOptions) -> 
     draw = None if kind in OF_RECORDS else run_kind(kind)
     options.refuse(kind, f"this picture is of kind {kind}")
     stored = find()
-    scenario = stored.scenario
+    scenario = stored.model.scenario
     table = options.experiment or (scenario.experiment.table if scenario.experiment is not None else None)
     curves = load_curves(table) if table is not None and has_curves(table) else None
     measured = None if table is None or curves is not None or draw is None else load_table(table).summaries()
@@ -406,7 +406,7 @@ def draw_film(place: Path, options: AnimateOptions) -> tuple[Path, str, str]:
     if options.out is not None:
         animation.writer_of(Path(options.out))
     stored = run_folder.read_run(place)
-    path = Path(options.out or f"{stored.scenario.name}.gif")
+    path = Path(options.out or f"{stored.model.scenario.name}.gif")
     files.refuse_foreign(path, overwrite=options.overwrite)
     older = OLDER if path.exists() else ""
     count, beyond = animate_run(stored, path, options)
@@ -415,7 +415,7 @@ def draw_film(place: Path, options: AnimateOptions) -> tuple[Path, str, str]:
 
 def animate_run(stored: run_folder.StoredRun, path: Path, options: AnimateOptions) -> tuple[int, str]:
     """Write a run as an animation; return the number of frames, and which blocks leave the view."""
-    scenario = stored.scenario
+    scenario = stored.model.scenario
     paint = paints.paint_of(options.colour, stored.frames, stored.model)
     look = animation.Look(options.width, options.trails, scenario.name, options.forces, paint)
     support = run_data.support_of(stored.model, stored.events, stored.probes() if scenario.actuators else {})
@@ -450,7 +450,7 @@ def _draw_sweep(folder: Path, options: PlotOptions) -> Path:
     chosen = SWEEP_KINDS[kind or next(suited)]
     if kind is not None and (reason := chosen.refusal(found)):
         raise InvalidInputError(f"{folder}: {reason}")
-    path = options.picture(f"{load_stored(folder / sweep_folder.PLAN).name}.png")
+    path = options.picture(f"{Model.stored(folder / sweep_folder.PLAN).scenario.name}.png")
     chosen.draw(found, path, options.paper)
     return path
 
@@ -493,7 +493,7 @@ def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
         def scenario() -> Scenario:
             if place.is_file():
                 return load_scenario(place)
-            return load_stored(run_folder.find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)
+            return Model.stored(run_folder.find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO).scenario
 
         return draw_motion(scenario, options), ""
     return draw_run(lambda: run_folder.read_run(place), options)

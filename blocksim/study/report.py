@@ -7,7 +7,7 @@ from typing import Any
 from blocksim.analysis.compare import Comparison
 from blocksim.analysis.metrics import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
-from blocksim.scenario import input_files, load_stored, scenario_to_toml
+from blocksim.scenario import Model, input_files, scenario_to_toml
 from blocksim.simulation import Result, files
 from blocksim.study import answer, compare, manifest, pictures, rows, run_folder, sweep_folder
 from blocksim.view.report import page, player, subjects as parts
@@ -60,11 +60,6 @@ def page_of_result(result: Result, experiment: Path | None = None) -> str:
     return page.page_text([parts.run_subject("part-1", run, *_compared(run, experiment))])
 
 
-def page_of_study(result: answer.UnstoredResult) -> str:
-    """Return the text of the page of a result of a study in memory."""
-    return page.page_text([parts.study_subject("part-1", answer.page_of(result, result.scenario), "")])
-
-
 def subjects_of(
     places: Sequence[Path],
     experiment: Path | None = None,
@@ -79,7 +74,7 @@ def subjects_of(
         study = answer.study_in(place)
         if study is not None:
             found = study.answer.read(place)
-            page = answer.page_of(found, load_stored(place / found.files.plan))
+            page = answer.page_of(found, Model.stored(place / found.files.plan).scenario)
             shown.append(parts.study_subject(key, page, str(place)))
             continue
         if manifest.is_sweep(place):
@@ -133,7 +128,7 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
     problems: list[str] = []
     scenario, judged, drawings = None, None, []
     try:
-        scenario = load_stored(place / sweep_folder.PLAN)
+        scenario = Model.stored(place / sweep_folder.PLAN).scenario
     except InputMissingError:
         pass
     except BlocksimError as error:

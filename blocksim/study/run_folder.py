@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
-from blocksim.scenario import Model, Scenario, spelling
+from blocksim.scenario import Model, spelling
 from blocksim.simulation import files, instruments, results, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
 from blocksim.study.rows import FINISHED, TABLE
@@ -100,11 +100,6 @@ class StoredRun(NamedTuple):
     events: tuple[results.EventRecord, ...]  # that have happened; none where run.json is missing or damaged
     remark: str  # for whoever examines the frames; empty for a finished run that was meant for certain
     probes: Callable[[], Mapping[str, instruments.ProbeSeries]]  # samples by name
-
-    @property
-    def scenario(self) -> Scenario:
-        """What was run."""
-        return self.model.scenario
 
 
 def read_run(place: Path | str) -> StoredRun:

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 PURPOSE = "sensitivity"
 LEVELS = 4
-POOL = 10  # random trajectories for one that is kept
 MOST_POINTS = 3000  # of the pool: all their distances are kept in memory
 RESAMPLES = 500
 
@@ -75,7 +74,7 @@ def _morris_points(keys: int, blocks: int, seed: int) -> Floats:
     The distance of two is the sum over all pairs of their points; squares are added up.
     """
     sample = load_module("SALib.sample.morris", PURPOSE).sample
-    pool = max(blocks, min(POOL * blocks, MOST_POINTS // (keys + 1)))
+    pool = max(blocks, min(10 * blocks, MOST_POINTS // (keys + 1)))  # random trajectories for one that is kept
     flat = np.asarray(sample(unit_cube(keys), pool, num_levels=LEVELS, seed=seed), dtype=np.float64)
     squares = np.sum(flat**2, axis=1)
     apart = np.sqrt(np.maximum(squares[:, None] + squares - 2.0 * flat @ flat.T, 0.0))

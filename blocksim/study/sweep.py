@@ -19,7 +19,6 @@ from blocksim.scenario import Document, Model, Source, document_of
 from blocksim.simulation import files, interruption, provenance, schemes
 from blocksim.study import executors, manifest, plan as plans, rows, sweep_folder
 
-MOST_INVALID = 500  # kept in memory before they are written
 SOONEST = 2.0  # s between two tables while the sweep runs
 SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
 OnRow = Callable[[int, int, rows.Row], None]
@@ -214,7 +213,7 @@ class SweepRun:
                 yield executors.Task(number, case.name, case.settings, case.model)
                 continue
             self.invalid.append((number, case.name, case.settings, rows.invalid_row(case.problem)))
-            if len(self.invalid) >= MOST_INVALID:
+            if len(self.invalid) >= 500:  # kept in memory before they are written
                 self._keep()
 
     def _keep(self, ended: Sequence[Ended] = ()) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.options import silent
-from blocksim.scenario import Model, input_files, scenario_hash
+from blocksim.scenario import Model, input_files
 from blocksim.scenario.structures.polygons import AS_READ
 from blocksim.simulation import Watcher, checkpoint, files, instruments, observables, provenance, results, simulate
 from blocksim.simulation.trajectory import csv_text
@@ -178,7 +178,7 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     if again.status == INTERRUPTED:
         raise StoppedEarlyError(f"{folder}: stopped before the new run was complete")
     origins, is_same_code = origin_differences(summary.environment)
-    now = scenario_hash(stored.scenario)
+    now = Model(stored.scenario).hash
     if now != summary.scenario_hash:
         origins = (OriginDifference("scenario", summary.scenario_hash, now), *origins)
     return RunVerdict(

@@ -10,7 +10,7 @@ from typing import Any
 from blocksim.kernels.common.arrays import World
 from blocksim.scenario.laws import LAWS, LINEAR
 from blocksim.scenario.models.timeline import SCHEMES, SPRINGS
-from blocksim.verification.scene import CaseScene, Simulation
+from blocksim.verification.scene import CaseScene, SteppedScene
 
 NUMBERS = ("quantity", "unit", "expected", "measured", "error", "tolerance")  # of a row, for programs
 VELOCITY_TOLERANCE = 1e-6
@@ -110,7 +110,7 @@ class Setting:
 
     def start(
         self, bodies: Sequence[Mapping[str, object]], change: Callable[[World], None] | None = None, **values: Any
-    ) -> Simulation:
+    ) -> SteppedScene:
         """Start such a scene."""
         return self.scene(bodies, **values).start(change)
 

@@ -11,23 +11,11 @@ from math import atan, atan2, cos, hypot, sin, sqrt, tan
 import numpy as np
 
 GRAVITY = 9.81  # m/s^2, the scenarios' default
-QUADRATURE_POINTS = 64  # rocking_quarter_time: round-off is reached with about 20
 
 
 def fall_distance(time: float, gravity: float = GRAVITY) -> float:
     """Return the distance (m) fallen from rest after `time` (s): g t^2/2, Eq. 10, first form."""
     return 0.5 * gravity * time**2
-
-
-def remaining_rise(time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
-    """Return (v - g t)^2/(2 g) (m), Eq. 10, second form, as printed, at `time` (s) after impact number `impacts`.
-
-    v = sqrt(2 g h0) e^p is the upward speed just after that impact. With the speed v - g t at that moment this is how
-    far the body will STILL rise, not how high it is: it is largest at the impact and zero at the apex. Height and
-    remaining rise add up to the apex height.
-    """
-    speed = sqrt(2.0 * gravity * height) * restitution**impacts
-    return (speed - gravity * time) ** 2 / (2.0 * gravity)
 
 
 def apex_height(height: float, restitution: float, impacts: int) -> float:
@@ -38,11 +26,6 @@ def apex_height(height: float, restitution: float, impacts: int) -> float:
 def flight_time(height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
     """Return the time (s) from impact number `impacts` to the next: t_p = 2 e^p sqrt(2 h0/g), Eq. 12."""
     return 2.0 * restitution**impacts * sqrt(2.0 * height / gravity)
-
-
-def sliding_speed(time: float, speed: float, friction: float, gravity: float = GRAVITY) -> float:
-    """Return the speed (m/s) on level ground at `time` (s): V0 - mu g t (Eq. 13, N = M g), 0 once at rest."""
-    return max(speed - friction * gravity * time, 0.0)
 
 
 def sliding_stop_time(speed: float, friction: float, gravity: float = GRAVITY) -> float:
@@ -154,7 +137,7 @@ def rocking_quarter_time(width: float, height: float, tilt: float, gravity: floa
     tilt < alpha.
     """
     alpha = atan2(width, height)
-    nodes, weights = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
+    nodes, weights = np.polynomial.legendre.leggauss(64)  # round-off is reached with about 20
     s = 0.5 * (nodes + 1.0)
     fallen = tilt * s**2
     drop = 2.0 * np.sin(alpha - tilt + 0.5 * fallen) * np.sin(0.5 * fallen)

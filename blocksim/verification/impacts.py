@@ -23,7 +23,7 @@ from blocksim.verification.scene import (
     POLL,
     WIDTH,
     PaperBlock,
-    Simulation,
+    SteppedScene,
     Throw,
     Thrower,
     kinetic_energy,
@@ -31,7 +31,6 @@ from blocksim.verification.scene import (
 
 SPACINGS = (5e-4, 1e-3, 2e-3, 4e-3)  # m, of boundary particles
 DROP, RESTITUTION = 0.1, 0.5  # m, -
-FALL_POLL = 5e-5  # s
 LARGEST = 10.0  # m, m/s: the numbers of the flight are smaller
 BOUNCE_TOLERANCES = (0.01, 0.02, 0.04)
 LONGEST = 0.6  # s; all bounces are over by then
@@ -51,7 +50,9 @@ def free_flight(setting: Setting) -> Iterator[Row]:
 
 def bounces(setting: Setting) -> Iterator[Row]:
     """Drop a block flat; apexes and flight time at four particle spacings, the farthest off counts."""
-    found = [observe_bounces(drop_flat(setting, spacing)) for spacing in setting.distinct(SPACINGS)]
+    flat, spacings = {"y": HEIGHT / 2 + DROP}, setting.distinct(SPACINGS)
+    drops = (setting.start([flat], restitution=RESTITUTION, contact={"particle_spacing": one}) for one in spacings)
+    found = [observe_bounces(one) for one in drops]
     for impact, tolerance in enumerate(BOUNCE_TOLERANCES, start=1):
         expected = forms.apex_height(DROP, RESTITUTION, impact)
         apex = farthest(expected, [apexes[impact - 1] for _, apexes in found])
@@ -61,13 +62,7 @@ def bounces(setting: Setting) -> Iterator[Row]:
     yield relative("first flight", "s", expected, flight, BOUNCE_TOLERANCES[0])
 
 
-def drop_flat(setting: Setting, spacing: float) -> Simulation:
-    """Drop a block flat from 0.1 m."""
-    body = {"y": HEIGHT / 2 + DROP}
-    return setting.start([body], restitution=RESTITUTION, contact={"particle_spacing": spacing})
-
-
-def observe_bounces(fall: Simulation) -> tuple[list[float], list[float]]:
+def observe_bounces(fall: SteppedScene) -> tuple[list[float], list[float]]:
     """Return the times (s) of the impacts and one more, and the apexes (m) between them; NaN where there is none.
 
     The time of an impact is that of the steepest change of speed, half a poll either way.
@@ -75,7 +70,7 @@ def observe_bounces(fall: Simulation) -> tuple[list[float], list[float]]:
     times: list[float] = []
     apexes = [0.0]
     falling = True
-    poll = max(FALL_POLL, fall.step)
+    poll = max(5e-5, fall.step)  # s
     while len(times) <= len(BOUNCE_TOLERANCES) and fall.time < LONGEST:
         body = fall.to_time(fall.time + poll).bodies[0]
         if falling and body.vy > 0.0:
@@ -94,8 +89,6 @@ TILT = radians(30.0)
 FALLING = forms.Velocity(0.0, -1.0, 0.0)
 STICKING = 2.0  # friction coefficient
 EXACT = 1e-9  # m/s, rad/s: rigid impacts are those of the closed forms
-COLLISION_STEPS = 20_000
-COLLISION_END = 4e-3  # s, of rigid blocks
 WIDTH_TWO = 0.03  # m: of the second of two blocks that collide
 REBOUNDS, REBOUND = (0.2, 0.8), 1e-3  # restitutions; off them by, as arms are those before a step
 
@@ -133,14 +126,14 @@ def sticking_corner(setting: Setting) -> Iterator[Row]:
     yield relative("spin", "rad/s", expected.spin, body.spin, 0.02)
 
 
-def collision(setting: Setting, restitution: float) -> Simulation:
+def collision(setting: Setting, restitution: float) -> SteppedScene:
     """Start two free blocks that will meet off-centre, both turning."""
     one = {"y": 0.1, "velocity": [1.0, 0.1], "spin": 5.0}
     two = {"y": 0.112, "x": 0.0335, "velocity": [-0.6, 0.0], "angle": 0.05, "spin": -12.0, "width": WIDTH_TWO}
     return setting.start([one, two], restitution=restitution, gravity=0.0)
 
 
-def momenta(scene: Simulation) -> NDArray[np.float64]:
+def momenta(scene: SteppedScene) -> NDArray[np.float64]:
     """Return momentum along x and y (kg m/s) and the angular momentum (kg m2/s) about the origin."""
     b = scene.bodies
     spin = b.inertia * b.spin + b.mass * (b.x * b.vy - b.y * b.vx)
@@ -157,7 +150,7 @@ def two_blocks(setting: Setting) -> Iterator[Row]:
     scenes = [collision(setting, e) for e in (0.0, 0.2, 1.0)]
     before = [momenta(scene) for scene in scenes]
     step = scenes[0].step
-    steps = COLLISION_STEPS if setting.has_springs else round(COLLISION_END / step)
+    steps = 20_000 if setting.has_springs else round(4e-3 / step)  # s, of rigid blocks
     after = [momenta(scene.to_step(steps)) for scene in scenes]
     worst = np.abs(np.array(after) - np.array(before)).max(axis=0)
     mass = float(scenes[0].bodies.mass.sum())
@@ -169,7 +162,7 @@ def two_blocks(setting: Setting) -> Iterator[Row]:
         yield from (Row(f"rebound at e = {e:g}", "", e, rebound(collision(setting, e)), REBOUND) for e in REBOUNDS)
 
 
-def rebound(scene: Simulation) -> float:
+def rebound(scene: SteppedScene) -> float:
     """Return how fast the points that meet first part, as a share of how fast they approached.
 
     The upper right corner of the left block meets the left face of the other one. Impulses act where the blocks are
@@ -214,7 +207,6 @@ SEATS = {
 }  # m: ends of the seats from the centre of the block
 LOOSE = (-WIDTH, 0.0, WIDTH)  # m, as wide as the block
 SEAT_RESTITUTIONS = (0.0, 0.2, 0.5, 0.8, 1.0)
-GAP_STEPS = 100.37  # of flight, so that a contact begins within a step
 LANDING_POLL, MOST_STEPS = 10, 4000
 
 
@@ -238,11 +230,11 @@ def land(setting: Setting, ends: Sequence[float], restitution: float, *, fixed: 
         for left, right in pairwise(ends)
     ]
 
-    def start(height: float) -> Simulation:
+    def start(height: float) -> SteppedScene:
         block = {"y": 1.5 * HEIGHT + height, "velocity": [0.0, -1.0]}
         return setting.start([*under, block], restitution=restitution, gravity=0.0)
 
-    scene = start(GAP_STEPS * start(0.5 * HEIGHT).step)
+    scene = start(100.37 * start(0.5 * HEIGHT).step)  # of flight, so that a contact begins within a step
     body = scene.world.bodies[len(under)]
     for steps in range(LANDING_POLL, MOST_STEPS, LANDING_POLL):
         scene.to_step(steps)
@@ -263,12 +255,10 @@ RIGID_LEDGER_TOLERANCE = 1e-11  # what impulses take is known to round-off
 # slope of cells has 119 MJ of potential energy, and hardly anything in play at first. The granite wall has its 100 kN
 # at once here: the work of loads is the trapezoid rule's, and that of the first substep begins at none.
 HEAVY = {"dam": 1e-8, "toppling_slope": 1e-10, "voronoi_slope": 1e-10, "granite_wall": 1e-5}
-LEDGER_TOLERANCE = 1e-3
 SOFT = 0.01  # stiffness scale of the quick size; crowds keep their own
 LESS_SOFT = 0.1  # with driven bodies: what starts at full speed is off by half a step of it, before anything has fallen
 STIFFER = 10.0  # where the scenario's own stiffness is too soft for a law
 CROWD = 100  # blocks; scenes of more on springs are run for their first moments only
-CROWD_END = 0.05  # s
 CROWD_END_PARTICLES = 0.002  # s, for the models with boundary particles, which take fifty times as long
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
@@ -313,7 +303,7 @@ def ledgers(setting: Setting) -> Iterator[Row]:
         if setting.has_springs and not own.time.has_springs:
             continue
         is_crowd = len(Model(own).bodies) > CROWD
-        name, tolerance = path.stem, LEDGER_TOLERANCE
+        name, tolerance = path.stem, 1e-3
         changes: dict[str, object] = {"contact.model": setting.model, "contact.law": setting.law}
         if not setting.has_springs:
             tolerance = HEAVY.get(path.stem, RIGID_LEDGER_TOLERANCE)
@@ -326,7 +316,7 @@ def ledgers(setting: Setting) -> Iterator[Row]:
             changes = {key: value for key, value in changes.items() if value not in {usual.model, usual.law}}
             if is_crowd:
                 name = f"{path.stem}, first moments"
-                changes["time.end"] = CROWD_END if setting.model == usual.model else CROWD_END_PARTICLES
+                changes["time.end"] = 0.05 if setting.model == usual.model else CROWD_END_PARTICLES  # s
         if setting.quick and not is_crowd:
             is_driven = any(body.motion is not None for body in own.bodies)
             changes["contact.stiffness_scale"] = LESS_SOFT if is_driven else SOFT
@@ -335,9 +325,9 @@ def ledgers(setting: Setting) -> Iterator[Row]:
             stiffness_scale = changes.get("contact.stiffness_scale", own.contact.stiffness_scale)
             changes["contact.stiffness_scale"] = STIFFER * float(str(stiffness_scale))
         scenario = document.with_values(changes).build()
-        run, worst = Simulation(build(Model(scenario))), 0.0  # the largest residual over the energy in play
+        run, worst = SteppedScene(build(Model(scenario))), 0.0  # the largest residual over the energy in play
         for k in range(1, round(scenario.time.end / scenario.output.every) + 1):
             worst = max(worst, run.to_time(k * scenario.output.every).residual())
-            if run.status != REACHED:
+            if run.code != REACHED:
                 break
-        yield Row(name, "", 0.0, worst if run.status in {REACHED, AT_REST} else nan, tolerance)
+        yield Row(name, "", 0.0, worst if run.code in {REACHED, AT_REST} else nan, tolerance)

@@ -52,7 +52,9 @@ def pushover(setting: Setting) -> Iterator[Row]:
             found, order = jack["displacement"], slice(None, int(np.argmax(jack["displacement"])) + 1)
             force = float(np.interp(way, found[order], jack["force"][order]))
             yield relative(f"V at {1e3 * way:.3g} mm, {name}", "kN", 1e-3 * _statics(way, name), 1e-3 * force, 5e-3)
-    jack, to_loads = _slide(setting)
+    bodies = [{"block": "wall", "name": "head", "x": 0.0, "y": 0.5 * HEIGHT}]
+    cycles = {"kind": "cycles", "amplitudes": [AMPLITUDE], "repeats": 2, "rate": 0.02}
+    jack, to_loads = _run(setting, bodies, [], cycles, RUBBED, {"point": [0.0, -0.49 * HEIGHT]})
     half = len(jack) // 2
     way = 2.0 * float(np.ptp(jack["displacement"][half:]))
     lost = float(jack["work"][-1] - jack["work"][half])
@@ -80,12 +82,6 @@ def _push(setting: Setting, line: str, guide: str, farthest: float) -> tuple[Pro
     ]
     down = {"kind": "force", "body": "head", "magnitude": PRESS, "direction": "-90 deg", "line": line}
     return _run(setting, bodies, [down], {"kind": "ramp", "to": farthest, "rate": 0.01}, FRICTION)
-
-
-def _slide(setting: Setting) -> tuple[ProbeSeries, float]:
-    bodies = [{"block": "wall", "name": "head", "x": 0.0, "y": 0.5 * HEIGHT}]
-    cycles = {"kind": "cycles", "amplitudes": [AMPLITUDE], "repeats": 2, "rate": 0.02}
-    return _run(setting, bodies, [], cycles, RUBBED, {"point": [0.0, -0.49 * HEIGHT]})
 
 
 def _run(

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.common.arrays import REACHED, World
+from blocksim.kernels.common.arrays import World
 from blocksim.scenario import Model, Scenario, scenario_from_mapping
 from blocksim.scenario.models import timeline
-from blocksim.simulation import balance, schemes
+from blocksim.simulation.loop import Simulation
 from blocksim.simulation.schemes import AnyScene, build, measure_row, scheme_of
 from blocksim.verification import closed_forms as forms
 from blocksim.world.build import arrays_of
@@ -36,16 +36,12 @@ class PaperBlock:
     point_stiffness = modulus * depth  # N/m, of one linear contact point; a face contact has two
 
 
-class Simulation:
-    """A scene under way, of any scheme."""
+class SteppedScene(Simulation):
+    """A scene under way, of any scheme, that goes on whatever happens, and what cases measure of it."""
 
     def __init__(self, scene: AnyScene) -> None:
         """Find the first contacts and remember the energy."""
-        self.scene = scene
-        self.status = REACHED
-        self.step = float(scene.world.controls[0].step)  # s
-        self.to_step(0)
-        self.start_energy = balance.start_energy(self.scene)  # J, of all that it holds and has lost: constant
+        self._take(scene)
 
     @property
     def bodies(self) -> Any:
@@ -57,55 +53,34 @@ class Simulation:
         """The arrays that all schemes have."""
         return self.scene.world
 
-    @property
-    def contact_records(self) -> Any:
-        """Records of all contacts, pair after pair; of the explicit scheme."""
-        count = int(self.world.clock[0].pair_count)
-        is_active = np.arange(self.world.contacts.shape[1]) < self.world.pairs.active[:count, np.newaxis]
-        return self.world.contacts[:count][is_active]
-
-    @property
-    def steps(self) -> int:
-        """Steps done."""
-        return int(self.world.clock[0].steps)
-
-    @property
-    def time(self) -> float:
-        """Time (s) since the start."""
-        return self.steps * self.step
-
     def to_step(self, last_step: int) -> Self:
         """Advance to a step number."""
-        self.scene, self.status = schemes.ALONE.advance(self.scene, last_step)
+        self._call(last_step)
         return self
 
     def to_time(self, time: float) -> Self:
         """Advance to the step nearest to a time (s)."""
         return self.to_step(round(time / self.step))
 
-    def ledger_row(self) -> NDArray[np.float64]:
-        """Return the energies (J) of the scheme's ledger, the number of contacts and the largest overlap (m)."""
-        return measure_row(self.scene)
-
     @property
     def kinetic(self) -> float:
         """Kinetic energy (J)."""
-        return float(self.ledger_row()[0])
+        return float(measure_row(self.scene)[0])
 
     @property
     def mechanical(self) -> float:
         """Kinetic, potential and stored energy (J): the entries that any ledger begins with."""
         held = sum(name in HELD for name in scheme_of(self.scene).ledger)
-        return float(self.ledger_row()[:held].sum())
+        return float(measure_row(self.scene)[:held].sum())
 
     @property
-    def contacts(self) -> int:
+    def contact_count(self) -> int:
         """Number of contact points."""
-        return int(self.ledger_row()[-2])
+        return int(measure_row(self.scene)[-2])
 
     def residual(self) -> float:
         """Return the residual of the ledger, as a share of the energy in play."""
-        return balance.energy_ledger(self.scene, self.start_energy).relative_residual
+        return self.energy().relative_residual
 
     def state(self) -> NDArray[np.float64]:
         """Return x, y, angle, vx, vy, spin of all bodies, one row a body."""
@@ -127,12 +102,12 @@ class CaseScene:
     time: Mapping[str, object] = field(default_factory=dict)  # more keys of [time]
     ground: Mapping[str, object] = field(default_factory=dict)  # more keys of [ground]
 
-    def start(self, change: Callable[[World], None] | None = None) -> Simulation:
+    def start(self, change: Callable[[World], None] | None = None) -> SteppedScene:
         """Start it; `change` edits the world before the first contacts are found."""
         scene = build(Model(self.scenario()))
         if change is not None:
             change(scene.world)
-        return Simulation(scene)
+        return SteppedScene(scene)
 
     @property
     def impacts(self) -> dict[str, str]:
@@ -182,7 +157,6 @@ def scenario_of(bodies: Sequence[Mapping[str, object]], **tables: Any) -> Scenar
 STRONG = 0.5  # restitution
 POLL = 40  # steps; an impact on springs takes thirty and more; a rigid one a part of one, so that others may follow
 MOST_STEPS = 4_000_000
-STEPS_BEFORE = 2.0  # of free flight
 GOLDEN = 0.6180339887498949  # its multiples, modulo 1, spread phases evenly over a step
 
 
@@ -214,7 +188,7 @@ class Thrower:
             array[...] = fresh
         body, step = self.world.bodies[0], float(self.world.controls[0].step)
         lowest = forms.lowest_corner(WIDTH, HEIGHT, throw.angle)[1]
-        body.y = self.speed * step * (STEPS_BEFORE + throw.phase) - lowest
+        body.y = self.speed * step * (2.0 + throw.phase) - lowest  # of free flight
         body.angle, body.cos, body.sin = throw.angle, cos(throw.angle), sin(throw.angle)
         self.world.interactions.static_friction[...] = throw.friction
         self.world.interactions.kinetic_friction[...] = throw.friction

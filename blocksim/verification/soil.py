@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.soil import arrays, stress
 from blocksim.scenario import Model, geometry
-from blocksim.simulation.schemes import build, ledger_names
+from blocksim.simulation.schemes import build, ledger_names, measure_row
 from blocksim.verification.case import Case, Row, Setting, at_least, count, relative
-from blocksim.verification.scene import Simulation
+from blocksim.verification.scene import SteppedScene
 from blocksim.world.systems.soils import connected_span
 
 DEPTH, UNIT_WEIGHT, DENSITY = 0.05, 20e3, 2721.7  # m, N/m3 of soil, kg/m3 of blocks
@@ -34,7 +34,6 @@ ACTIVE = (1.0 - SINE) / (1.0 + SINE)  # K = sigma_x/sigma_y: Mohr and Coulomb's
 BAND = math.sin(math.atan(SINE))  # soil of constant volume slips in a band at tan(phi*) = sin(phi): E. H. Davis, 1968
 ACTIVE_OF_BANDS = (1.0 - BAND) / (1.0 + BAND)
 AT_REST = (1.0 - SINE / math.sqrt(3.0)) / (1.0 + 2.0 * SINE / math.sqrt(3.0))  # Drucker and Prager's, no strain aside
-EVERY = 20  # steps between two samples of a force
 SOFT = {"young_modulus": 5.84e6, "poisson_ratio": 0.3}
 RODS = {**SOFT, "unit_weight": UNIT_WEIGHT, "friction_angle": f"{math.degrees(ANGLE)!r} deg"}
 MATERIALS: dict[str, dict[str, Any]] = {
@@ -53,7 +52,7 @@ def block(width: float, height: float, material: str = "block") -> dict[str, Any
     return {"width": width, "height": height, "length": DEPTH, "material": material}
 
 
-class SoilScene(Simulation):
+class SoilScene(SteppedScene):
     """Soil between what is given: a rectangle with its lower left corner at x, y, unless there is an `outline`."""
 
     def __init__(  # noqa: PLR0913 - what cases differ by
@@ -116,7 +115,7 @@ class SoilScene(Simulation):
         """
         number, forces = body % self.world.bodies.size, []
         while self.time < end:
-            self.to_step(self.steps + EVERY)
+            self.to_step(self.steps + 20)  # steps between two samples of a force
             touches = self.soils.touches[: int(self.soils.controls.touch_count[0])]
             on_it = touches[(touches["body"] == number) & (touches["normal_force"] > 0.0)]
             forces.append(-np.array([on_it["fx"].sum(), on_it["fy"].sum()]))
@@ -124,7 +123,7 @@ class SoilScene(Simulation):
 
     def entries(self) -> dict[str, float]:
         """Return the entries (J) of the ledger."""
-        return dict(zip(ledger_names(self.scene), self.ledger_row().tolist(), strict=False))
+        return dict(zip(ledger_names(self.scene), measure_row(self.scene).tolist(), strict=False))
 
 
 STEP = 1e-5  # s
@@ -443,8 +442,8 @@ def columns_of_rods(setting: Setting) -> Iterator[Row]:
         x, y = scene.points["x"], scene.points["y"]
         front = connected_span(x, 2.0 * spacing)[1] + 0.5 * spacing
         height = float(y[x < 2.0 * spacing].max()) + 0.5 * spacing
-        left = 1.0 if ratio <= 0.65 else 1.0 / (1.42 * ratio ** (2.0 / 3.0))  # noqa: PLR2004 - of the source
-        run_out = 3.25 * ratio**0.96 if ratio <= 1.5 else 3.80 * ratio**0.73  # noqa: PLR2004 - of the source
+        left = 1.0 if ratio <= 0.65 else 1.0 / (1.42 * ratio ** (2.0 / 3.0))
+        run_out = 3.25 * ratio**0.96 if ratio <= 1.5 else 3.80 * ratio**0.73
         head = f"{dict(GRADIENTS)[gradient]}{name} mm, s {1e3 * spacing:g} mm"
         yield relative(f"{head}: height left", "", left, height / TALL, 0.07)
         last = float(x.max()) + 0.5 * spacing

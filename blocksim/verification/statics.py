@@ -9,17 +9,15 @@ import numpy as np
 from blocksim.scenario.laws import LAWS
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, count, farthest, relative
-from blocksim.verification.scene import HEIGHT, WIDTH, PaperBlock, Simulation
+from blocksim.verification.scene import HEIGHT, WIDTH, PaperBlock, SteppedScene
 
 CONTACT_RADIUS = 1e-3  # m
 STANDING, FALLING = (10.5e-3, 0.99), (10.8e-3, 1.01)  # m, equal offset; share of the harmonic overhang
-MOST_OVERHANGING = 4
 OBSERVED = 1.5  # s
 FALLEN = 0.1  # of a block height
 SOFT = 0.01  # stiffness scale of the quick size; linear sags stay a fifth of the margins
 STILL, KEPT = 0.5, 1e-6  # s, m: a stack that stands keeps its place in the last half second
 LOADING, LOADING_STEPS = 0.2, 200  # s
-TOWER = 10
 
 
 def static_overlap(setting: Setting) -> Iterator[Row]:
@@ -48,7 +46,7 @@ def overhanging_stacks(setting: Setting) -> Iterator[Row]:
 def stacks(offset: float, share: float) -> Iterator[Sequence[Mapping[str, object]]]:
     """Return the stack of three with an offset (m) and the overhangs with a share of the largest one."""
     yield [{"x": i * offset, "y": (i + 0.5) * HEIGHT} for i in range(3)]
-    for number in range(1, MOST_OVERHANGING + 1):
+    for number in range(1, 5):
         offsets = [share * offset for offset in reversed(forms.harmonic_offsets(number, WIDTH))]
         places = [{"x": x, "y": (level + 0.5) * HEIGHT} for level, x in enumerate(accumulate(offsets), start=1)]
         yield [{"y": 0.5 * HEIGHT, "fixed": True}, *places]
@@ -78,7 +76,7 @@ def outcome(setting: Setting, bodies: Sequence[Mapping[str, object]]) -> bool | 
 def tower(setting: Setting) -> Iterator[Row]:
     """Ten blocks straight up: their creep speed and largest gain of mechanical energy over that at the start."""
     contact = {"stiffness_scale": SOFT if setting.quick else 1.0}
-    stack = setting.start([{"y": (i + 0.5) * HEIGHT} for i in range(TOWER)], contact=contact)
+    stack = setting.start([{"y": (i + 0.5) * HEIGHT} for i in range(10)], contact=contact)
     gain, halves = 0.0, []
     for end in (0.5, 1.0) if setting.quick else (5.0, 10.0):
         for time in np.linspace(stack.time, end, 51)[1:]:
@@ -115,7 +113,7 @@ def sliding_to_rest(setting: Setting) -> Iterator[Row]:
     yield relative("time", "s", time, farthest(time, [stop for _, stop in slides]), 0.005)
 
 
-def on_slope(setting: Setting, slope: float, friction: float) -> Simulation:
+def on_slope(setting: Setting, slope: float, friction: float) -> SteppedScene:
     """Put a block on a slope (rad) that goes down towards +x."""
     return setting.start([{"y": HEIGHT / 2}], ground_friction=friction, tilt=-slope)
 

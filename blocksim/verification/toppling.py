@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.verification import case, closed_forms as forms
-from blocksim.verification.scene import HEIGHT, WIDTH, Simulation
+from blocksim.verification.scene import HEIGHT, WIDTH, SteppedScene
 
 SLENDER, TALL = 0.010, 0.040  # m
 NO_SLIP = 5.0  # friction coefficient
@@ -25,7 +25,7 @@ SETTLED = 1e-3  # s after the impact
 GRAVITY = forms.GRAVITY
 
 
-def start_rocking(setting: case.Setting, restitution: float) -> Simulation:
+def start_rocking(setting: case.Setting, restitution: float) -> SteppedScene:
     """Let go of a slender block that stands on its right corner, turned by half the angle of balance."""
     tilt = forms.toppling_slope(SLENDER, TALL) / 2
     # the corner stays at x = SLENDER/2, y = 0; turned clockwise
@@ -46,7 +46,7 @@ def quarter_period(setting: case.Setting) -> Iterator[case.Row]:
     yield case.relative("time to upright", "s", expected, time, 0.005)
 
 
-def until_upright(scene: Simulation) -> float:
+def until_upright(scene: SteppedScene) -> float:
     """Continue until the angle changes its sign; return the time (s) there, by interpolation."""
     block, steps = scene.bodies[0], scene.steps
     angle = float(block.angle)
@@ -78,7 +78,6 @@ SLOPE_HALVINGS, LADDER_HALVINGS = 6, 7
 OBSERVED = 0.35  # s; enough to see a block go at a hundredth of a degree beyond a limit
 SLID, TURNED = 1e-5, radians(1.0)  # m, before the block has turned by so much
 LADDER, LADDER_THICKNESS, LADDER_SLOPE = 1.0, 0.01, radians(60.0)  # m, m, rad
-SLIPPED = 1e-4  # rad, of turning
 WALL = 0.2  # m, thickness
 
 
@@ -145,7 +144,7 @@ def ladder(setting: case.Setting) -> Iterator[case.Row]:
 
     def stays(friction: float) -> bool:
         scene = setting.start([rod, wall], friction=0.0, ground_friction=friction)
-        return bool(abs(scene.to_time(1.0).bodies[0].angle - rod["angle"]) <= SLIPPED)
+        return bool(abs(scene.to_time(1.0).bodies[0].angle - rod["angle"]) <= 1e-4)  # rad, of turning
 
     expected = forms.ladder_friction(LADDER_SLOPE, LADDER_THICKNESS / LADDER)
     found = limit(stays, 0.9 * expected, 1.1 * expected, LADDER_HALVINGS)
@@ -174,7 +173,6 @@ FIRST, LAST = 10, 20
 PUSH = 6.5  # spin of the first domino in units of sqrt(g/h): near that of the stationary wave for every gap
 SOFT = 0.01  # stiffness scale of the quick size
 POLL = 2e-4  # s
-LONGEST_WAVE = 2.0  # s
 
 
 class DominoModel:
@@ -251,7 +249,7 @@ def dominoes(setting: case.Setting) -> Iterator[case.Row]:
         contact = {"stiffness_scale": SOFT if setting.quick else 1.0}
         scene = setting.start(bodies, restitution=0.0, friction=0.0, ground_friction=NO_SLIP, contact=contact)
         times = [np.nan] * (COUNT - 1)
-        while scene.time < LONGEST_WAVE and np.isnan(times[LAST - 1]):
+        while scene.time < 2.0 and np.isnan(times[LAST - 1]):  # s
             scene.to_time(scene.time + POLL)
             for i in np.flatnonzero(scene.bodies.spin[1:] < -moving):
                 times[i] = scene.time if np.isnan(times[i]) else times[i]

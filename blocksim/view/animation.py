@@ -149,11 +149,9 @@ WRITERS: dict[str, Writer] = {".gif": write_gif, ".mp4": write_mp4}  # by suffix
 DOTS_PER_INCH = 100.0  # letters of 11 pixels
 MARGINS = 0.15, 0.50, 0.42  # inches: at the sides, above and below the panel
 HIGHEST = 1.25  # height of the panel over its width
-KEY_FOOT = 0.04  # inches, below what explains the colours
 HELD = 1.5  # s that the last picture stays
 MOST_PICTURES = 10_000
 TIME_ROOM, MARKS_ROOM = 60.0, 70.0  # points: for the time, and for a mark of what acts on all bodies
-FEW_NAMES = 2  # of blocks that leave the view
 FEW_BLOCKS = 30  # up to which trails are drawn by default
 TRAIL: dict[str, Any] = {"linewidths": 1.0, "alpha": 0.5, "zorder": 2.5}  # below names
 
@@ -241,7 +239,7 @@ def beyond_view(names: Sequence[str], seen: run_data.Flags) -> str:
     if not gone:
         return ""
     verb = "leaves" if len(gone) == 1 else "leave"
-    if len(gone) <= FEW_NAMES:
+    if len(gone) <= 2:  # of blocks that leave the view
         return f"block{'' if len(gone) == 1 else 's'} {' and '.join(gone)} {verb} the view"
     return f"{len(gone)} of {len(names)} blocks {verb} the view"
 
@@ -277,7 +275,7 @@ class Animation:
             self.canvas = page.canvas(figure)
             scene.finish_panel(self.canvas, labelled=True)
             style.write_heading(figure, look.title, side)
-            paints.draw_key(figure, paint, side, KEY_FOOT)
+            paints.draw_key(figure, paint, side, 0.04)  # inches, below what explains the colours
             scales = [self.beyond, "" if self.forces is None else f"forces: {self.forces.example}"]
             scales.append(f"loads: {self.acts.sizes}" if self.acts.sizes else "")
             # at the right, beside the time, where there is room

@@ -313,11 +313,8 @@ def _marks(times: Floats, support: Support) -> tuple[tuple[Mark, ...], ...]:
 
 
 COLOUR = "#A50026"
-ARC_POINTS = 24
 ROUND_HEAD = 4.0  # points, of round arrows
-LEAST_SWEEP = 0.02  # rad
 MARK, MARK_SIDE = 9.0, 12.0  # points: length of the arrow of a mark, and room for it
-MARK_LETTER = 5.0  # points
 MARK_GAP = 8.0  # points between two marks
 
 
@@ -327,13 +324,13 @@ def draw_actions(canvas: Canvas, found: Actions, index: int, length: float) -> N
         draw_arrows(canvas, one.lines(length)[index], 1.0, style.INK if one.kind == SPEED else COLOUR)
     turns = found.turns
     for number in range(0 if turns is None else len(turns.radius)):
-        if turns is not None and abs(turns.sweep[index, number]) >= LEAST_SWEEP:
+        if turns is not None and abs(turns.sweep[index, number]) >= 0.02:  # rad
             _draw_turn(canvas, turns.at[index, number], float(turns.radius[number]), float(turns.sweep[index, number]))
 
 
 def _draw_turn(canvas: Canvas, centre: Floats, radius: float, sweep: float) -> None:
     """Draw a round arrow (mm, rad), which is open at the right."""
-    angle = (0.25 * np.pi if sweep > 0.0 else -0.25 * np.pi) + np.linspace(0.0, sweep, ARC_POINTS)
+    angle = (0.25 * np.pi if sweep > 0.0 else -0.25 * np.pi) + np.linspace(0.0, sweep, 24)
     points = centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     way = (points[-1] - points[-2]) / np.hypot(*(points[-1] - points[-2]))
     chord = float(np.hypot(*(points[-1] - points[0])))
@@ -361,4 +358,4 @@ def draw_marks(canvas: Canvas, marks: tuple[Mark, ...], offset: float = 0.0, *, 
             ends = {"xy": tuple(centre + way), "xytext": tuple(centre - way)}
             canvas.axes.annotate("", **ends, annotation_clip=False, arrowprops=arrow)
         canvas.axes.text(left + MARK_SIDE * point, top + up * point, mark.text, va="bottom", color=COLOUR)
-        offset += MARK_SIDE + MARK_LETTER * len(mark.text) + MARK_GAP
+        offset += MARK_SIDE + 5.0 * len(mark.text) + MARK_GAP  # points

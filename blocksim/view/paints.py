@@ -17,7 +17,6 @@ from blocksim.view import run_data, style
 SPEED_COLOURS = "YlGnBu"  # light at rest; darker in steps that are seen in grey as well
 ELEMENT_COLOURS = "viridis"  # of the elements of systems beside the blocks: seen on white at rest too
 TURN_COLOURS = "PuOr"  # distinguishable with every common colour blindness
-HALF_TURN = 180.0  # degrees; blocks that have turned farther share the colour
 LEAST_TURN = 1.0  # degrees
 RARE = 0.995  # share of all speeds that the scale covers
 PEAK = 1.5  # largest over that speed, from which the scale leaves the rest beyond its end
@@ -107,7 +106,7 @@ def by_turn(frames: Frames) -> Paint:
     """Return a scale of the angle turned since the blocks were placed, the same to both sides."""
     turns = np.degrees(frames.rotation)
     farthest = float(np.abs(turns[run_data.drawable_frames(frames)]).max())
-    most = min(max(farthest, LEAST_TURN), HALF_TURN)
+    most = min(max(farthest, LEAST_TURN), 180.0)  # degrees; blocks that have turned farther share the colour
     extend = "both" if farthest > most * 1.001 else "neither"
     return _scaled(turns, Scale("rotation (°)", TURN_COLOURS, -most, most, extend))
 

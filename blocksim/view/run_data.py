@@ -25,7 +25,6 @@ Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 Repeats = Sequence[Any]
 """What was measured: block, quantity, mean, minimum and maximum (mm or degrees) of each, such as `Statistics`."""
-PRINTED_DIGITS = 3  # of a time in s
 PRINTED = 0.000501  # s; half of the last digit of a printed time, and round-off
 LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
 
@@ -118,7 +117,7 @@ def moments_at(frames: Frames, chosen: Indices, times: Sequence[float]) -> Indic
         raise InvalidInputError(f"time {outside[0]:g} s lies outside the recorded span, {first:g} to {last:g} s")
     if len(times) == 0:
         raise InvalidInputError("no times to draw were given")
-    wanted = [last if time == round(last, PRINTED_DIGITS) else time for time in times]
+    wanted = [last if time == round(last, 3) else time for time in times]  # of a time in s
     return chosen[[int(np.argmin(np.abs(recorded - time))) for time in wanted]]
 
 

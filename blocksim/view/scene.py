@@ -13,10 +13,8 @@ from blocksim.view import paints, run_data, style
 from blocksim.world.systems.blocks import are_removed, placed_points
 
 GROUND_THICKNESS = 5.0  # points, below the lowest ground
-RULER_EDGE = 10.0  # points; no number is nearer to the edge of a panel
 TICK_SPACING = 36.0  # points along the ruler
 TICK_LENGTH = 2.5  # points
-RULER_HEIGHT = 14.0  # points, with the numbers
 TICK_ROOM = 0.4  # inches along the axis for one number
 ROW_HEIGHT = 9.0  # points, of one row of measured ranges
 
@@ -106,7 +104,7 @@ def depth_of(rows: int) -> float:
 def room_below(extent: run_data.Extent, rows: int) -> float:
     """Return how far the picture continues below the lowest ground (points)."""
     depth = depth_of(rows)
-    return (depth + RULER_HEIGHT) / float(np.cos(extent.tilt)) if extent.tilt else depth
+    return (depth + 14.0) / float(np.cos(extent.tilt)) if extent.tilt else depth  # points, with the numbers
 
 
 def finish_panel(canvas: Canvas, *, labelled: bool, is_numbered: bool = True, rows: int = 0) -> None:
@@ -129,7 +127,7 @@ def finish_panel(canvas: Canvas, *, labelled: bool, is_numbered: bool = True, ro
         return
     y = extent.base - depth_of(rows) / points
     low, high = extent.span(y)
-    edge, tick = RULER_EDGE / points, TICK_LENGTH / points
+    edge, tick = 10.0 / points, TICK_LENGTH / points  # points; no number is nearer to the edge of a panel
     locator = MaxNLocator(nbins=max(2, int((high - low) * points / TICK_SPACING)), steps=[1, 2, 5, 10])
     line: dict[str, Any] = {"color": style.FAINT_INK, "linewidth": style.LINE_WIDTH, "transform": canvas.scene}
     axes.plot([low, high], [y, y], **line)
@@ -143,7 +141,6 @@ def finish_panel(canvas: Canvas, *, labelled: bool, is_numbered: bool = True, ro
 WALL_THICKNESS = 4.0  # points; less than the ground, which covers the feet of walls
 WALLS, GROUND, START, SHIFT = 0.5, 0.6, 0.7, 3.0  # order of drawing; blocks are at 1, lines at 2
 START_LINE: dict[str, Any] = {"colors": style.FAINT_INK, "linewidths": style.LINE_WIDTH, "linestyles": [(0, (3, 2))]}
-LEAST_SHIFT = 0.7  # points; what moved less is at the start's place to the eye
 ARROW_LENGTH = 3.0  # points; a displacement along the ground gets an arrow from here on
 MOST_ALIGNED = -0.8  # cosine between two walls that turn back so sharply that a mitre would be a needle
 
@@ -172,7 +169,7 @@ def draw_start(canvas: Canvas, support: run_data.Support, offset: run_data.Float
 
     Pieces that have moved along themselves, such as level ground on a shaking table, look the same and are left out.
     """
-    least = LEAST_SHIFT / canvas.points_per_mm
+    least = 0.7 / canvas.points_per_mm  # points; what moved less is at the start's place to the eye
     if float(np.hypot(*offset)) < least:
         return
     low, high = canvas.box()
@@ -236,11 +233,9 @@ def wall_outlines(walls: tuple[PlacedSegment, ...], thickness: float) -> list[ru
 EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half the height
 TOP = "Thick line inside a block: top face at the start."
 NAME_ROOM = 0.85, 0.7  # width and height for a block's name, as parts of its smaller side
-LEAST_SINE = 1e-9  # between two edges that are not parallel
 LETTERS = 100  # of a name; longer ones have no room anywhere
 FIXED_HATCH = "////"
 HALO = 2.0  # points around a name, so that paths of centres do not strike through it
-LEAST_HATCHED = 12.0  # points; on smaller blocks hatching is a few stray lines
 SMALL, CLOSED = 6.0, 0.42  # points, of discs drawn without gaps; share of a size that closes those of a square lattice
 
 
@@ -350,7 +345,7 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
     smallest = run_data.MILLIMETRES * canvas.points_per_mm * float(frames.least_widths.min(initial=np.inf))
     thin = min(style.LINE_WIDTH, 0.05 * smallest)
     edge: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
-    hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
+    hatch = FIXED_HATCH if smallest >= 12.0 else None  # points; on smaller blocks hatching is a few stray lines
     for kind, lines in ((held, hatch), (free, None)):
         shown = [own[block] for block in np.flatnonzero(kind)]
         style.add_polygons(canvas.axes, outlines[kind], facecolors=shown, hatch=lines, **edge)
@@ -425,7 +420,7 @@ def upper_sides(frames: Frames) -> run_data.Floats:
     along = np.stack([-normal[:, 1], normal[:, 0]], axis=-1)
     across = np.einsum("bec,bc->be", normals, along)
     room = depth - np.einsum("bec,bc->be", normals, start)
-    others = is_edge & (np.abs(across) > LEAST_SINE)
+    others = is_edge & (np.abs(across) > 1e-9)  # between two edges that are not parallel
     shares = room / np.where(others, across, 1.0)
     last = np.where(others & (across > 0.0), shares, np.inf).min(axis=1)
     first = np.minimum(np.where(others & (across < 0.0), shares, -np.inf).max(axis=1), last)

@@ -15,7 +15,6 @@ HEAD, TITLE, FOOT = 0.22, 0.30, 0.28  # inches: time above a panel, title of the
 LINE = 0.155  # inches, of each further line of text above a panel
 LEAST_WIDTH, NARROWEST_PANEL, LOWEST_PANEL = 1.75, 1.25, 0.25  # inches, on a page whose size was asked for
 TICKS = 0.26  # inches, for the numbers under a row of panels; tilted panels have theirs inside
-TALLEST_PANEL = 4.0  # inches
 WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a panel stays about an inch tall
 LOW_ENOUGH = 1.6  # width over height from which four rows of pairs fit on a page
 CAPTION = 3.0  # points, from a panel to the text above it
@@ -80,7 +79,7 @@ def plan(paper: style.Paper, extent: run_data.Extent, columns: int, panels: int,
     def scale_in(columns: int) -> float:
         """Return the largest scale (inches per mm) of so many columns; not above 0 where none fits."""
         rows = -(-panels // columns)
-        tallest = TALLEST_PANEL if paper.size is None else (paper.size[1] - others(rows)) / rows
+        tallest = 4.0 if paper.size is None else (paper.size[1] - others(rows)) / rows  # inches
         high = min((tallest - below) / (extent.top - extent.lowest), tallest / extent.height)
         return min(_panel_width(columns, width) / extent.width, high)
 

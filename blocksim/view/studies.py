@@ -1,4 +1,4 @@
-"""Pictures of studies: a quantity with its law, limits over a key, fragility, bars of sensitivity, convergence.
+"""Pictures of studies: limits over a key, fragility, bars of sensitivity, convergence.
 
 Of convergence: how far coarser levels of a numerical setting are from the finest, a panel each, finer to the right.
 """
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.view import run_data, style, time_panels
+from blocksim.view import run_data, style
 from blocksim.view.sweeps.data import short_names
 
 PANEL, LEAST = (4.4, 3.0), (1.8, 1.0)  # inches, of the panel, and on a page whose size was asked for
@@ -37,70 +37,12 @@ def open_study_figure(
         style.save_figure(figure, path)
 
 
-LAW_SIDES, LAW_GAP = (0.75, 0.15, 0.11, 0.36), 0.16  # inches
-LAW_PANEL, LAW_LEAST = (6.3, 1.7), (1.0, 0.5)  # inches, of each panel, and on a page whose size was asked for
-SIMULATED: dict[str, Any] = {"color": "#0072B2", "linewidth": 3.0, "alpha": 0.55, "solid_capstyle": "butt"}
-EXPECTED: dict[str, Any] = {"color": style.INK, "linewidth": 1.0, "linestyle": (0, (4, 2))}
-
-
-@dataclass(frozen=True, eq=False)
-class LawCurve:
-    """n values of one quantity: simulated and by a formula, in the unit of `quantity`; NaN where there is no formula.
-
-    `marks` are times (s) worth a thin line, such as impacts.
-    """
-
-    quantity: str
-    unit: str
-    formula: str
-    time: run_data.Floats  # (n,) s
-    simulated: run_data.Floats  # (n,)
-    expected: run_data.Floats  # (n,)
-    marks: Sequence[float] = ()
-
-    @property
-    def largest(self) -> float:
-        """The largest difference, without sign."""
-        return float(np.nanmax(np.abs(self.simulated - self.expected)))
-
-
-def draw_law(law: LawCurve, path: Path | str, title: str, paper: style.Paper = style.OWN) -> None:
-    """Draw the quantity, and its difference to the formula, and write PNG, SVG or PDF; the same input, the same bytes.
-
-    Raises InvalidInputError for an unknown picture format or a page that is too small, and OutputError when the file
-    cannot be written.
-    """
-    path = style.picture_path(path)
-    difference, is_known = law.simulated - law.expected, np.isfinite(law.expected)
-    with style.open_panels(paper, [1, 1], LAW_PANEL, LAW_LEAST, LAW_SIDES, (0.0, LAW_GAP), title=title) as opened:
-        figure, ((above,), (below,)) = opened
-        above.plot(law.time, law.simulated, label="simulated", **SIMULATED)
-        above.plot(law.time, law.expected, label=law.formula, **EXPECTED)
-        above.legend(loc="upper right", frameon=False)
-        below.plot(law.time, difference, color=SIMULATED["color"], linewidth=1.0)
-        known = np.concatenate([law.simulated, law.expected[is_known]])
-        panels = ((above, law.quantity, known), (below, "difference", difference[is_known]))
-        for axes, label, values in panels:
-            for mark in law.marks:
-                axes.axvline(mark, color=style.FAINT_INK, linewidth=0.5, zorder=0)
-            axes.spines[["right", "top"]].set_visible(False)
-            axes.set_xlim(float(law.time[0]), float(law.time[-1]))
-            axes.set_ylim(*time_panels.limits_of(values))
-            axes.set_ylabel(f"{label} ({law.unit})")
-            style.number_axis(axes.yaxis)
-        figure.align_ylabels()
-        above.tick_params(labelbottom=False)
-        below.set_xlabel("time (s)", labelpad=2.0)
-        style.save_figure(figure, path)
-
-
 MARGIN = 0.06  # of an axis
 MOST_NUMBERS = 6
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")  # by the kind of the change
 LINE_COLOUR = "#777777"
 OTHERS = ("#D55E00", "#000000", "#56B4E9", "#777777")  # of what others found
 MARKS = "DsX^"
-MOST_MARKS = 12  # series with more points are lines
 
 
 class LimitRange(NamedTuple):
@@ -158,7 +100,7 @@ def draw_limit_curve(
             axes.plot(*zip(start, end, strict=True), color=LINE_COLOUR, linewidth=1.0, zorder=2)
         for number, series in enumerate(curve.beside):
             look: dict[str, Any] = {"color": OTHERS[number % len(OTHERS)], "linewidth": 1.4, "zorder": 1.5}
-            if len(series.points) <= MOST_MARKS:
+            if len(series.points) <= 12:  # series with more points are lines
                 look |= {"linestyle": "none", "marker": MARKS[number % len(MARKS)], "markersize": 6.0, "zorder": 3.0}
                 look |= {"markerfacecolor": "none"}
             axes.plot(*zip(*series.points, strict=True), label=series.name, **look)
@@ -337,7 +279,7 @@ TRIAL_PANEL, TRIAL_LEAST = (2.4, 2.0), (1.3, 0.8)  # inches, of a panel, and on 
 TRIAL_SIDES, TRIAL_GAPS = (0.65, 0.2, 0.11, 0.45), (0.55, 0.55)  # inches, around panels and between them
 MOST_ACROSS, TICKS = 3, 4
 TRIED: dict[str, Any] = {"color": style.FAINT_INK, "marker": "o", "markersize": 3.0, "linestyle": "none"}
-BEST: dict[str, Any] = {"color": SIMULATED["color"], "marker": "o", "markersize": 5.0, "linestyle": "none"}
+BEST: dict[str, Any] = {"color": COLOURS[0], "marker": "o", "markersize": 5.0, "linestyle": "none"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -395,7 +337,6 @@ MARKERS = "osD^vP"
 MOST_BLOCKS = 4
 LARGEST: dict[str, Any] = {"color": style.INK, "linewidth": 2.5, "alpha": 0.25}
 DISTANCE, SHORT_DISTANCE = "distance from the finest level (mm)", "distance (mm)"
-NUMBER_ROOM = 0.5  # inches, for a number below an axis
 
 
 @dataclass(frozen=True)
@@ -519,7 +460,7 @@ def _draw_level(axes: "style.Axes", panel: LevelPanel, shown: Sequence[int], wid
     # numbers below every n-th level where they are many, always below the scenario's own
     margin = (float(panel.values[-1]) / float(panel.values[0])) ** 0.04
     axes.set_xlim(float(panel.values[0]) / margin, float(panel.values[-1]) * margin)
-    apart = -(-len(panel.values) // int(width / NUMBER_ROOM))
+    apart = -(-len(panel.values) // int(width / 0.5))  # inches, for a number below an axis
     start = int(np.argmin(np.abs(panel.values - panel.own))) % apart
     axes.set_xticks(panel.values[start::apart], [f"{value:.3g}" for value in panel.values[start::apart]])
     axes.xaxis.minorticks_off()

@@ -221,6 +221,7 @@ class Layout(NamedTuple):
     """Placement of a scenario before arrays are built: it determines their sizes."""
 
     model: Model
+    scenario: Scenario
     placed: tuple[PlacedBody, ...]
     segments: tuple[PlacedSegment, ...]
     classes: tuple[ContactClass, ...]
@@ -229,11 +230,6 @@ class Layout(NamedTuple):
     applied: LoadArrays
     slabs: arrays.Records  # (s,) BODY: the pieces of ground and walls
     shapes: Shapes
-
-    @property
-    def scenario(self) -> Scenario:
-        """What it is the layout of."""
-        return self.model.scenario
 
     @property
     def shape(self) -> tuple[object, ...]:
@@ -252,7 +248,9 @@ def layout_of(model: Model) -> Layout:
     slabs = _slab_records(scenario, placed, segments, classes)
     shapes = shapes_of(placed, zip(slabs["half_x"].tolist(), slabs["half_y"].tolist(), strict=True))
     prescribed = drive_records(model), load_arrays(model)
-    return Layout(model, placed, segments, classes, interactions_of(scenario, classes), *prescribed, slabs, shapes)
+    return Layout(
+        model, scenario, placed, segments, classes, interactions_of(scenario, classes), *prescribed, slabs, shapes
+    )
 
 
 def _slab_records(

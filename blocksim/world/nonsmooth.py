@@ -149,8 +149,3 @@ def with_more_constraints(scene: arrays.Nonsmooth) -> arrays.Nonsmooth:
         getattr(larger.contacts, name)[: getattr(old, name).size] = getattr(old, name)
     contacts = larger.contacts._replace(states=old.states, before=old.before, ends=old.ends, residuals=old.residuals)
     return scene._replace(world=larger.world, contacts=contacts, kept=larger.kept)
-
-
-def with_more_threads(scene: arrays.Nonsmooth, threads: int) -> arrays.Nonsmooth:
-    """Return the same scene with room for the exchange between that many threads."""
-    return scene._replace(contacts=scene.contacts._replace(residuals=np.zeros((2, LINE_WORDS * threads))))

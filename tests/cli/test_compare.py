@@ -10,7 +10,7 @@ import pytest
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import ExperimentTable, Measurement
 from blocksim.cli.compare import verdict_lines
-from blocksim.scenario import Model, load_stored
+from blocksim.scenario import Model
 from blocksim.simulation.observables import OBSERVABLES, Observable
 from blocksim.study.executors.ensemble import run_case
 from tests.cli.conftest import SOFT, Command
@@ -119,7 +119,7 @@ def test_an_added_observable_is_found_everywhere(blocksim: Command, monkeypatch:
     table = pd.read_csv("sweep/sweep.csv")
     assert table["overhang_mm"][1] == value  # of the same run, in an ensemble
     assert (
-        run_case(Model(load_stored(Path("run/scenario.toml"))), Path("run"))["overhang_mm"] == value
+        run_case(Model(Model.stored(Path("run/scenario.toml")).scenario), Path("run"))["overhang_mm"] == value
     )  # of a kept case
 
     middle = f"{table['overhang_mm'].mean()} mm"

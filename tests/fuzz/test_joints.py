@@ -15,7 +15,7 @@ from blocksim.kernels.common.mechanics import renew_rotations
 from blocksim.scenario import Model
 from blocksim.scenario.geometry import centre_outline, centroid
 from blocksim.simulation.schemes import build
-from blocksim.verification.scene import CaseScene, Simulation
+from blocksim.verification.scene import CaseScene, SteppedScene
 from blocksim.world.build import arrays_of
 from tests.sizes import in_all
 
@@ -138,7 +138,7 @@ class Pieces:
         self.scene = build(Model(scene.scenario()))
         self.fresh = [array.copy() for array in arrays_of(self.scene)]
 
-    def throw(self, random: np.random.Generator) -> Simulation:
+    def throw(self, random: np.random.Generator) -> SteppedScene:
         """Turn and shift each piece as a whole, or leave it as it is drawn, and give its stones velocities."""
         for array, fresh in zip(arrays_of(self.scene), self.fresh, strict=True):
             array[...] = fresh
@@ -159,7 +159,7 @@ class Pieces:
                 vx, vy, spin = speed * random.normal(size=3) if moves else (0.0, 0.0, 0.0)
                 bodies.vx[i], bodies.vy[i], bodies.spin[i] = vx, vy, spin / SIZE
         renew_rotations(self.scene.world.bodies)
-        return Simulation(self.scene)
+        return SteppedScene(self.scene)
 
 
 def origin_of(piece: int) -> Points:
@@ -167,7 +167,7 @@ def origin_of(piece: int) -> Points:
     return np.array([piece % 8 - 4, 2 + piece // 8]) * CELL
 
 
-def energies_of(run: Simulation, pieces: NDArray[np.int64]) -> NDArray[np.float64]:
+def energies_of(run: SteppedScene, pieces: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return kinetic energy, and what springs along normals hold, of each piece (J)."""
     bodies, world = run.bodies, run.world
     kinetic = 0.5 * (bodies.mass * (bodies.vx**2 + bodies.vy**2) + bodies.inertia * bodies.spin**2)
@@ -198,4 +198,4 @@ def test_stones_that_share_corners_part_without_nan_and_without_more_energy(sche
                 where = number, throw, look
                 assert np.isfinite(run.state()).all(), (where, np.flatnonzero(~np.isfinite(energies)))
                 assert (energies <= most).all(), (where, np.flatnonzero(energies > most), (energies / most).max())
-            assert run.status == REACHED
+            assert run.code == REACHED

@@ -31,7 +31,7 @@ from blocksim.scenario import Model, Scenario
 from blocksim.scenario.geometry import Corners, centre_outline, regular
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build
-from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, SteppedScene, scenario_of
 from blocksim.world.build import build_world
 from blocksim.world.nonsmooth import with_more_constraints
 from tests.kernels.references import turning
@@ -89,12 +89,12 @@ def rigid(scenario: Scenario, **stepping: Any) -> Scenario:
     return scenario.model_copy(update={"time": time})
 
 
-def begin(scenario: Scenario, **stepping: Any) -> Simulation:
+def begin(scenario: Scenario, **stepping: Any) -> SteppedScene:
     """Start a scenario with rigid contacts; keywords are keys of [time]."""
-    return Simulation(build(Model(rigid(scenario, **stepping))))
+    return SteppedScene(build(Model(rigid(scenario, **stepping))))
 
 
-def single(bodies: Sequence[Mapping[str, object]], **values: Any) -> Simulation:
+def single(bodies: Sequence[Mapping[str, object]], **values: Any) -> SteppedScene:
     """Start single bodies with rigid contacts; keywords of [time] go there, all others to the scene."""
     stepping = {name: values.pop(name) for name in list(values) if name in Stepping.model_fields}
     return begin(CaseScene(bodies, time=RIGID, **values).scenario(), end=ENDLESS, **stepping)

@@ -28,7 +28,7 @@ from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.explicit.persistent_forces import CHANGED, UNTOUCHED, persistent_forces
 from blocksim.kernels.sph.fields import PLACE, find_neighbours
 from blocksim.scenario import Model
-from blocksim.verification.scene import Simulation, scenario_of
+from blocksim.verification.scene import SteppedScene, scenario_of
 from blocksim.world.build import build_world, empty_lists
 from tests.kernels.references import apart as largest_gap, distances, turning
 from tests.kernels.scenes import make_body, pose
@@ -330,7 +330,7 @@ def jolt() -> World:
 
 
 def test_no_body_comes_beyond_its_share_before_pairs_are_looked_for(pace: int) -> None:
-    scene = Simulation(jolt())
+    scene = SteppedScene(jolt())
     stops, share = round(0.02 / scene.step) // pace, PAIR_SHARE * float(scene.world.controls[0].skin)
     for step in range(1, stops):
         bodies = scene.to_step(step).world.bodies

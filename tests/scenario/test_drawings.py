@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError, ScenarioError, UnavailableError
-from blocksim.scenario import Model, Scenario, load_scenario, scenario_hash, scenario_to_toml
+from blocksim.scenario import Model, Scenario, load_scenario, scenario_to_toml
 from blocksim.scenario.document import Document
 from blocksim.scenario.structures.drawings import DrawingError, read_drawing, simplify
 from tests.golden import Golden
@@ -65,7 +65,7 @@ def test_results_keep_the_blocks_and_need_the_drawing_no_more(tmp_path: Path) ->
     drawing.unlink()
     again = Document.parse(text).build()
     assert Model(again).bodies == Model(first).bodies
-    assert scenario_hash(again) == scenario_hash(first)
+    assert Model(again).hash == Model(first).hash
 
 
 def test_geometries_without_features_are_read(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 
-from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml
+from blocksim.scenario import Model, Scenario, load_scenario, scenario_from_mapping, scenario_to_toml
 from blocksim.scenario.models.motion import FromTable, MotionTableError, Record, read_motion_table, read_record
 from blocksim.scenario.motion import (
     Floats,
@@ -321,7 +321,7 @@ def test_a_copied_motion_means_the_same_whatever_its_name_and_the_hash_follows_i
     assert load_scenario(copy) == first
     for text in (*texts, *others):
         written(tmp_path, text, "motion.csv")
-        assert (scenario_hash(load_scenario(copy)) == scenario_hash(first)) == (text in texts)
+        assert (Model(load_scenario(copy)).hash == Model(first).hash) == (text in texts)
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])

@@ -15,6 +15,7 @@ from blocksim.scenario.models.loads import Face
 from blocksim.scenario.open_faces import face_of, strip_before
 from blocksim.scenario.overrides import freeze
 from blocksim.scenario.placement import LENGTH_WITHOUT_BLOCKS, PlacedBody, reference_length, smallest_width
+from blocksim.world.bodies import layout_of
 from tests.golden import parsed
 from tests.scenario.conftest import MATERIAL, SCENARIOS, data_of, edited, read
 
@@ -34,14 +35,14 @@ def test_the_three_blocks_stand_as_in_the_experiment() -> None:
 
 def test_a_scenario_is_placed_once_and_its_bodies_go_with_it() -> None:
     # placing a million blocks takes seconds; check, build and describe all ask for them
-    scenario = load_scenario(SCENARIOS / "wall.toml")
-    bodies = Model(scenario).bodies
-    assert Model(scenario).bodies is bodies
-    other = scenario.model_copy(update={"structures": ()})
+    model = Model(SCENARIOS / "wall.toml")
+    bodies = model.bodies
+    assert Model(model).bodies is model.bodies is bodies
+    assert layout_of(model).placed is bodies
+    other = model.scenario.model_copy(update={"structures": ()})
     assert Model(other).bodies != bodies
-    assert Model(scenario).bodies == bodies
-    weak = weakref.ref(scenario)
-    del scenario
+    weak = weakref.ref(model.scenario)
+    del model
     gc.collect()
     assert weak() is None
 

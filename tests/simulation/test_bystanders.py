@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import Model
 from blocksim.simulation.schemes import build
-from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
+from blocksim.verification.scene import HEIGHT, WIDTH, SteppedScene, scenario_of
 
 AWAY = 5.0  # m
 TIME = {"scheme": "nonsmooth", "step": 1e-3, "substeps": 4, "velocity_tolerance": 1e-6, "stop_at_rest": False}
@@ -36,7 +36,7 @@ def scene_of(seed: int) -> tuple[list[dict[str, Any]], dict[str, Any]]:
 def end_of(bodies: list[dict[str, Any]], contact: Mapping[str, object], **tables: Any) -> NDArray[np.float64]:
     """Return the states of bodies after 0.1 s."""
     scenario = scenario_of(bodies, contact=contact, time=TIME, **tables)
-    return Simulation(build(Model(scenario))).to_time(0.1).state()
+    return SteppedScene(build(Model(scenario))).to_time(0.1).state()
 
 
 @pytest.mark.parametrize("seed", range(30))

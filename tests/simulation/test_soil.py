@@ -103,7 +103,7 @@ def test_particles_too_near_to_one_another_end_the_run() -> None:
     soil.soils.points["y"][:160] = 0.02
     soil.soils.controls.is_listed[0] = 0
     soil.to_step(2000)
-    assert soil.status != 0
+    assert soil.code != 0
     assert soil.steps < 1000
 
 

@@ -79,7 +79,7 @@ def test_a_limit_is_drawn_as_its_mechanism_beside_the_last_that_stands(
         run = read_run(slid.folder / "cases" / name)
         release = "always" if value == change.high else "at rest"  # it falls before time zero
         kept = {"output.contacts": True, "start.release": release, "time.stop_at_rest": value != change.high}
-        assert run.scenario == replace_values(slid.plan.model_at(value).scenario, kept)
+        assert run.model.scenario == replace_values(slid.plan.model_at(value).scenario, kept)
         if value == change.low:
             assert float(run.frames.time[-1]) == pytest.approx(slid.rows[value]["seconds"])
     assert plot(slid) == Path("slope_mechanism.png")

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from numpy.typing import NDArray
 
 from blocksim.verification.case import Setting
-from blocksim.verification.scene import Simulation
+from blocksim.verification.scene import SteppedScene
 from tests.sizes import in_all
 
 EXPLICIT, RIGID = "explicit", "nonsmooth"
@@ -61,7 +61,9 @@ def for_all(strategy: st.SearchStrategy[Any], examples: int, check: Callable[[An
     limits(given(strategy)(check))()
 
 
-def start(stack: Stack, bodies: Sequence[Mapping[str, object]], scheme: str, *, gravity: float = GRAVITY) -> Simulation:
+def start(
+    stack: Stack, bodies: Sequence[Mapping[str, object]], scheme: str, *, gravity: float = GRAVITY
+) -> SteppedScene:
     """Start blocks made as those of a stack; impulses are solved to round-off."""
     time = {"velocity_tolerance": 1e-12} if scheme == RIGID else {}
     return Setting(scheme=scheme, rigid_step=RIGID_STEP).start(

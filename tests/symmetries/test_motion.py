@@ -8,7 +8,7 @@ from hypothesis import assume, strategies as st
 
 from blocksim.scenario import Model, scenario_from_mapping
 from blocksim.simulation.schemes import build
-from blocksim.verification.scene import Simulation
+from blocksim.verification.scene import SteppedScene
 from tests.symmetries.scenes import (
     BEFORE_CHAOS,
     EXPLICIT,
@@ -164,7 +164,7 @@ def test_no_size_of_blocks_is_special(name: str) -> None:
             "contact": {"restitution": restitution, **lengths},
             "time": {"end": 10.0 * time, **rest, **({"scheme": RIGID, **rigid} if scheme == RIGID else {})},
         }
-        run = Simulation(build(Model(scenario_from_mapping(tables))))
+        run = SteppedScene(build(Model(scenario_from_mapping(tables))))
         units = np.array([size, size, 1.0, size / time, size / time, 1.0 / time])
         return run.to_step(steps).state() / units
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from blocksim.kernels.common.arrays import World
 from blocksim.verification.case import Setting
-from blocksim.verification.scene import Simulation
+from blocksim.verification.scene import SteppedScene
 from tests.symmetries.scenes import EXPLICIT, RIGID, RIGID_STEP, for_all, some
 
 Change = Callable[[World], None]
@@ -79,7 +79,7 @@ def smallest(bodies: Sequence[dict[str, object]]) -> float:
     return min(float(str(body[name])) for body in bodies for name in ("width", "height"))
 
 
-def started(setting: Setting, bodies: Sequence[dict[str, object]], change: Change | None = None) -> Simulation:
+def started(setting: Setting, bodies: Sequence[dict[str, object]], change: Change | None = None) -> SteppedScene:
     """Start a pair without weight; overlaps may be as deep as half the smallest side."""
     side = smallest(bodies)
     contact: dict[str, object] = {"max_overlap": 0.5 * side}
@@ -119,7 +119,7 @@ def pushed(setting: Setting, pair: Pair, order: int) -> Pushed:
     return Pushed(one, two, scene.step, EPSILON * float(np.abs(before).max()))
 
 
-def momenta(scene: Simulation) -> np.ndarray:
+def momenta(scene: SteppedScene) -> np.ndarray:
     """Return momentum (x, y) and angular momentum about the origin, a row a body."""
     body = scene.bodies
     px, py = body["mass"] * body["vx"], body["mass"] * body["vy"]

@@ -9,11 +9,11 @@ paper's own simulation are here.
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import isfinite, sqrt
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,12 +25,69 @@ from blocksim.simulation import files, results
 from blocksim.simulation.run import simulate
 from blocksim.study.answer import number_text
 from blocksim.verification import closed_forms as forms
-from blocksim.view import run_data, scene, studies, style
+from blocksim.view import run_data, scene, style, time_panels
 from blocksim.view.final import draw_final
 from blocksim.view.strip import draw_strip
 
 MILLI = 1e3
 LEAST_APEX = 2e-5  # m; lower bounces are not distinguished from rest
+
+
+LAW_SIDES, LAW_GAP = (0.75, 0.15, 0.11, 0.36), 0.16  # inches
+LAW_PANEL, LAW_LEAST = (6.3, 1.7), (1.0, 0.5)  # inches, of each panel, and on a page whose size was asked for
+SIMULATED: dict[str, Any] = {"color": "#0072B2", "linewidth": 3.0, "alpha": 0.55, "solid_capstyle": "butt"}
+EXPECTED: dict[str, Any] = {"color": style.INK, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+
+
+@dataclass(frozen=True, eq=False)
+class LawCurve:
+    """n values of one quantity: simulated and by a formula, in the unit of `quantity`; NaN where there is no formula.
+
+    `marks` are times (s) worth a thin line, such as impacts.
+    """
+
+    quantity: str
+    unit: str
+    formula: str
+    time: run_data.Floats  # (n,) s
+    simulated: run_data.Floats  # (n,)
+    expected: run_data.Floats  # (n,)
+    marks: Sequence[float] = ()
+
+    @property
+    def largest(self) -> float:
+        """The largest difference, without sign."""
+        return float(np.nanmax(np.abs(self.simulated - self.expected)))
+
+
+def draw_law(law: LawCurve, path: Path | str, title: str, paper: style.Paper = style.OWN) -> None:
+    """Draw the quantity, and its difference to the formula, and write PNG, SVG or PDF; the same input, the same bytes.
+
+    Raises InvalidInputError for an unknown picture format or a page that is too small, and OutputError when the file
+    cannot be written.
+    """
+    path = style.picture_path(path)
+    difference, is_known = law.simulated - law.expected, np.isfinite(law.expected)
+    with style.open_panels(paper, [1, 1], LAW_PANEL, LAW_LEAST, LAW_SIDES, (0.0, LAW_GAP), title=title) as opened:
+        figure, ((above,), (below,)) = opened
+        above.plot(law.time, law.simulated, label="simulated", **SIMULATED)
+        above.plot(law.time, law.expected, label=law.formula, **EXPECTED)
+        above.legend(loc="upper right", frameon=False)
+        below.plot(law.time, difference, color=SIMULATED["color"], linewidth=1.0)
+        known = np.concatenate([law.simulated, law.expected[is_known]])
+        panels = ((above, law.quantity, known), (below, "difference", difference[is_known]))
+        for axes, label, values in panels:
+            for mark in law.marks:
+                axes.axvline(mark, color=style.FAINT_INK, linewidth=0.5, zorder=0)
+            axes.spines[["right", "top"]].set_visible(False)
+            axes.set_xlim(float(law.time[0]), float(law.time[-1]))
+            axes.set_ylim(*time_panels.limits_of(values))
+            axes.set_ylabel(f"{label} ({law.unit})")
+            style.number_axis(axes.yaxis)
+        figure.align_ylabels()
+        above.tick_params(labelbottom=False)
+        below.set_xlabel("time (s)", labelpad=2.0)
+        style.save_figure(figure, path)
 
 
 def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -50,7 +107,29 @@ class Bounce(NamedTuple):
     flight: float
 
 
-def bounce_law(result: results.Result) -> studies.LawCurve:
+def remaining_rise(
+    time: float, height: float, restitution: float, impacts: int, gravity: float = forms.GRAVITY
+) -> float:
+    """Return (v - g t)^2/(2 g) (m), Eq. 10, second form, as printed, at `time` (s) after impact number `impacts`.
+
+    v = sqrt(2 g h0) e^p is the upward speed just after that impact. With the speed v - g t at that moment this is how
+    far the body will STILL rise, not how high it is: it is largest at the impact and zero at the apex. Height and
+    remaining rise add up to the apex height.
+    """
+    speed = sqrt(2.0 * gravity * height) * restitution**impacts
+    return (speed - gravity * time) ** 2 / (2.0 * gravity)
+
+
+def sliding_speed(time: float, speed: float, friction: float, gravity: float = forms.GRAVITY) -> float:
+    """Return the speed (m/s) on level ground at `time` (s): V0 - mu g t (Eq. 13, N = M g), 0 once at rest."""
+    return max(speed - friction * gravity * time, 0.0)
+
+
+def replicates_of(table: ExperimentTable) -> list[str]:
+    return [str(number) for number in sorted({one.replicate for one in table.measurements})]
+
+
+def bounce_law(result: results.Result) -> LawCurve:
     """Return the height (mm) of the lower face over a bounce, and Eq. 10 from its start.
 
     The second form of Eq. 10 as printed gives the remaining rise: the height is the apex of Eq. 12 less that, 0 after
@@ -69,12 +148,12 @@ def bounce_law(result: results.Result) -> studies.LawCurve:
             return start - forms.fall_distance(time, gravity)
         if number == len(impacts):
             return 0.0
-        still = forms.remaining_rise(time - impacts[number - 1], start, restitution, number, gravity)
+        still = remaining_rise(time - impacts[number - 1], start, restitution, number, gravity)
         return forms.apex_height(start, restitution, number) - still
 
     expected = np.array([height(float(time)) for time in frames.time])
     marks = [time for time in impacts if time < float(frames.time[-1])]
-    return studies.LawCurve("height", "mm", "Eq. 10", frames.time, MILLI * clearance, MILLI * expected, marks)
+    return LawCurve("height", "mm", "Eq. 10", frames.time, MILLI * clearance, MILLI * expected, marks)
 
 
 def bounces(result: results.Result) -> list[Bounce]:
@@ -109,13 +188,13 @@ def bounces(result: results.Result) -> list[Bounce]:
     ]
 
 
-def slide_law(result: results.Result) -> studies.LawCurve:
+def slide_law(result: results.Result) -> LawCurve:
     """Return the speed (mm/s) of a sliding block, and Eq. 13 with the ground's friction."""
     frames, gravity = result.frames, result.scenario.gravity
     friction, start = result.scenario.friction.block_ground.kinetic, float(frames.vx[0, 0])
-    expected = np.array([forms.sliding_speed(float(time), start, friction, gravity) for time in frames.time])
+    expected = np.array([sliding_speed(float(time), start, friction, gravity) for time in frames.time])
     marks = [forms.sliding_stop_time(start, friction, gravity)]
-    return studies.LawCurve("speed", "mm/s", "Eq. 13", frames.time, MILLI * frames.vx[:, 0], MILLI * expected, marks)
+    return LawCurve("speed", "mm/s", "Eq. 13", frames.time, MILLI * frames.vx[:, 0], MILLI * expected, marks)
 
 
 PAPER_X = {"1": "16", "2": "76.05", "3": "about 130"}  # mm, section 3.3 of the paper
@@ -160,7 +239,7 @@ def edges_table(edges: ExperimentTable, runs: Sequence[results.Result]) -> str:
             places = [run.columns[f"{quantity}_mm"][list(run.columns["block"]).index(block)] for run in runs]
             texts = (*_repeats(edges, block, quantity), *(number_text(place, 2) for place in places))
             rows.append((f"{quantity}, block {block}", *texts))
-    return markdown(("mm", *map(str, edges.replicates), "mean", *(f"`{run.name}`" for run in runs)), rows)
+    return markdown(("mm", *replicates_of(edges), "mean", *(f"`{run.name}`" for run in runs)), rows)
 
 
 def centres_table(centres: ExperimentTable, runs: Sequence[results.Result]) -> str:
@@ -188,7 +267,7 @@ def centres_table(centres: ExperimentTable, runs: Sequence[results.Result]) -> s
         if row.quantity == "rotation"
     ]
     names = [f"`{run.name}`" for run in runs]
-    heads = ("mm", *map(str, centres.replicates), "mean", "the paper's simulation", *names)
+    heads = ("mm", *replicates_of(centres), "mean", "the paper's simulation", *names)
     said = "✓ inside the range of the six repeats, ✗ outside."
     turned = markdown(("block", "measured, all repeats", *names), rotations)
     return f"{markdown(heads, places)}\n\n{said}\n\n{turned}"
@@ -232,8 +311,8 @@ def write_paper(folder: Path, scenarios: Path, settings: Mapping[str, object] | 
     options = scene.PictureOptions(f"Figure 3: {first.name}", centres.summaries(), support, count=PANELS, paper=PAPER)
     draw_final(first.frames, final, options)
     draw_strip(first.frames, strip, replace(options, title=f"Figure 4: {first.name}"))
-    studies.draw_law(height, equation10, "Equation 10: height over a bounce", PAPER)
-    studies.draw_law(speed, equation13, "Equation 13: speed of a sliding block", PAPER)
+    draw_law(height, equation10, "Equation 10: height over a bounce", PAPER)
+    draw_law(speed, equation13, "Equation 13: speed of a sliding block", PAPER)
     parts = [
         "# The paper's figures, tables and equations, simulated",
         (

@@ -14,7 +14,7 @@ from blocksim.statics.blockwork import Blockwork
 from blocksim.statics.joint_forces import joint_forces
 from blocksim.statics.programme import Programme
 from blocksim.verification.arches import COCCHETTI_RIZZI, HEAD, VOUSSOIRS, least_thickness
-from blocksim.verification.scene import Simulation
+from blocksim.verification.scene import SteppedScene
 from tests.simulation.conftest import SCENARIOS
 
 RADIUS = 10.0  # m, mean
@@ -23,10 +23,10 @@ LEAST = [(0.4, 0.10672), (0.325, 0.17821)]  # of thickness over mean radius
 PULL = 0.37361  # along the ground over weight, under which the arch of tilting_arch.toml falls
 
 
-def after_a_second(name: str, **values: Any) -> tuple[Simulation, float]:
+def after_a_second(name: str, **values: Any) -> tuple[SteppedScene, float]:
     """Return a shipped arch on its way, at the step it takes by itself, and the speed (m/s) of its fastest block."""
     scenario = load_scenario(SCENARIOS / f"{name}.toml", {"time.step": "auto", **values})
-    run = Simulation(build(Model(scenario))).to_time(1.0)
+    run = SteppedScene(build(Model(scenario))).to_time(1.0)
     return run, float(np.hypot(run.bodies.vx, run.bodies.vy).max())
 
 

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Model, PlacedBody, Scenario
+from blocksim.scenario import Scenario, placement
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Case, CaseOutcome, Row, Setting, at_least, run_case
 from blocksim.verification.cases import CASES, SettingError, choose_cases, exclusions
 from blocksim.verification.soil import SOIL_CASES
 from blocksim.verification.toppling import DominoModel, limit
-from blocksim.world import bodies
 from tests.verification.reference import (
     BEGIN,
     END,
@@ -116,12 +115,15 @@ RECTANGLES = [
 def test_rectangles_given_as_outlines_have_the_same_answers(
     case: Case, setting: Setting, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def as_outlines(scenario: Scenario) -> tuple[PlacedBody, ...]:
-        return tuple(body._replace(outline=body.corners) for body in Model(scenario).bodies)
+    place = placement.place
+
+    def as_outlines(scenario: Scenario) -> placement.Placement:
+        placed = place(scenario)
+        return placed._replace(bodies=tuple(body._replace(outline=body.corners) for body in placed.bodies))
 
     plain = run_case(case, setting)
     assert missed(plain) == []
-    monkeypatch.setattr(bodies, "place_bodies", as_outlines)
+    monkeypatch.setattr(placement, "place", as_outlines)
     near = 1e-9 if setting.has_springs else 0.0  # a domino of V18 jams, and a last bit grows to 2.5e-3
     if case.id == "S6":
         near = 1e-5  # mm/s, of blocks that hold soil, long after they came to rest

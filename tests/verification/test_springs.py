@@ -13,11 +13,12 @@ from blocksim.scenario.geometry import Corners, centre_outline, regular, section
 from blocksim.verification import impacts
 from blocksim.verification.case import Setting
 from blocksim.verification.impacts import LANDINGS
-from blocksim.verification.scene import GOLDEN, HEIGHT, WIDTH, CaseScene, Simulation, Throw, Thrower
+from blocksim.verification.scene import GOLDEN, HEIGHT, WIDTH, CaseScene, SteppedScene, Throw, Thrower
 from blocksim.world import nonsmooth
 from blocksim.world.build import build_world
 from blocksim.world.interactions import damping_ratio
 from tests.conftest import PaperBlock, Start
+from tests.contacts import contact_records
 
 G = 9.81
 PHASES = tuple((GOLDEN * k) % 1.0 for k in range(14))  # of a step; zero begins exactly at one
@@ -50,7 +51,7 @@ def test_block_between_two_others_is_stable_at_any_damping(start: Start, paper_b
     bodies = [{"y": 0.5 * paper_block.height}, lid]
     scene = start(bodies, restitution=0.0, gravity=0.0, time=time, contact=far, change=press)
     speeds = [abs(float(scene.to_step(step).bodies[0].vy)) / (w * OFFSET) for step in range(2000)]
-    assert scene.status == REACHED
+    assert scene.code == REACHED
     assert max(speeds) < 1.0
     assert speeds[-1] < 1e-3
 
@@ -100,10 +101,10 @@ def test_hexagon_that_rolls_onto_its_next_face_keeps_eleven_seventeenths_of_its_
     assert spins[fall + 15] / spins[fall - 15] == pytest.approx(11.0 / 17.0, rel=0.01)
 
 
-def motion_bits(scene: Simulation) -> dict[str, bytes]:
+def motion_bits(scene: SteppedScene) -> dict[str, bytes]:
     """Return the bits of all that moves, and of what the contacts remember."""
     names = ("x", "y", "angle", "cos", "sin", "vx", "vy", "spin", "ax", "ay", "spin_rate")
-    return {name: scene.bodies[name].tobytes() for name in names} | {"contacts": scene.contact_records.tobytes()}
+    return {name: scene.bodies[name].tobytes() for name in names} | {"contacts": contact_records(scene.world).tobytes()}
 
 
 def test_a_crowd_moves_the_same_to_the_last_bit_with_any_skin_of_the_scenario() -> None:
@@ -112,8 +113,8 @@ def test_a_crowd_moves_the_same_to_the_last_bit_with_any_skin_of_the_scenario() 
     ends, rebuilds = [], []
     for share in (0.5, 1.0, 3.0):
         skin = {} if share == 1.0 else {"skin": share * usual}
-        scene = Simulation(build_world(Model(pushed_wall(5, 8, contact={**contact, **skin})))).to_time(0.15)
-        assert scene.status == REACHED
+        scene = SteppedScene(build_world(Model(pushed_wall(5, 8, contact={**contact, **skin})))).to_time(0.15)
+        assert scene.code == REACHED
         ends.append(motion_bits(scene))
         rebuilds.append(int(scene.world.clock[0].rebuilds))
     assert ends[0] == ends[1] == ends[2]

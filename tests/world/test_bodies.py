@@ -21,7 +21,7 @@ from blocksim.kernels.common.arrays import (
 from blocksim.kernels.common.tolerances import CONE_TOLERANCE
 from blocksim.scenario import Model, Scenario, place_segments, scenario_from_mapping
 from blocksim.scenario.geometry import centre_outline, regular
-from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
+from blocksim.verification.scene import HEIGHT, SteppedScene, scenario_of
 from blocksim.world import memory
 from blocksim.world.bodies import cone_of, corner_rows, division
 from blocksim.world.build import (
@@ -52,7 +52,7 @@ def scene_of(
     restitution: float = 0.2,
     time: Mapping[str, object] | None = None,
     **tables: Any,
-) -> Simulation:
+) -> SteppedScene:
     """Start soft blocks that rub alike against everything."""
     contact = {
         "model": model,
@@ -64,7 +64,7 @@ def scene_of(
     }
     tables.setdefault("friction", {"block_block": FRICTION, "block_ground": FRICTION})
     scenario = scenario_of(bodies, contact=contact, time={"stop_at_rest": False, **(time or {})}, **tables)
-    return Simulation(build_world(Model(scenario)))
+    return SteppedScene(build_world(Model(scenario)))
 
 
 def slabs_of(**tables: Any) -> tuple[Records, tuple[Any, ...]]:
@@ -73,7 +73,7 @@ def slabs_of(**tables: Any) -> tuple[Records, tuple[Any, ...]]:
     return slabs, place_segments(scenario)
 
 
-def block_state(scene: Simulation) -> np.ndarray:
+def block_state(scene: SteppedScene) -> np.ndarray:
     return np.asarray(scene.state()[0])
 
 
@@ -153,10 +153,10 @@ def test_nothing_falls_through_a_valley(model: str) -> None:
     scene = scene_of([thrown], model=model, ground={"profile": [[-0.2, 0.2], [0.0, 0.0], [0.2, 0.2]]})
     while scene.time < 0.2:
         scene.to_time(scene.time + 0.002)
-        assert scene.status == REACHED
+        assert scene.code == REACHED
         heights = corners(scene.bodies[0])
         assert (heights[:, 1] - np.abs(heights[:, 0])).min() > -2e-3
-    assert scene.contacts > 0
+    assert scene.contact_count > 0
 
 
 WITH_PARTICLES = ["kernel", "particles"]

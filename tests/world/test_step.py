@@ -14,7 +14,8 @@ from blocksim.kernels.common.arrays import AT_REST, REACHED, World
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, tangent_stiffness
 from blocksim.scenario import Model, PlacedBody, Scenario
 from blocksim.scenario.laws import LAWS
-from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
+from blocksim.simulation.schemes import measure_row
+from blocksim.verification.scene import HEIGHT, WIDTH, SteppedScene, scenario_of
 from blocksim.world.bodies import layout_of
 from blocksim.world.build import build_world
 from blocksim.world.describe import describe
@@ -82,8 +83,8 @@ def test_a_load_makes_a_light_block_no_faster_than_the_way_across_the_scene_lets
     assert speeds[1] == speeds[2] == pytest.approx(sqrt(2.0 * 1e3 / block.mass * across))
 
 
-def hertz(body: Mapping[str, object], **contact: object) -> Simulation:
-    return Simulation(world_of(body, contact={"law": "hertz-mindlin", "stiffness_scale": 1e-2, **contact}))
+def hertz(body: Mapping[str, object], **contact: object) -> SteppedScene:
+    return SteppedScene(world_of(body, contact={"law": "hertz-mindlin", "stiffness_scale": 1e-2, **contact}))
 
 
 @pytest.mark.parametrize(("body", "restitution"), [(FALLING, 1.0), ({**FALLING, "velocity": [0.0, -3.0]}, 0.2)])
@@ -96,8 +97,8 @@ def test_no_contact_becomes_stiffer_than_the_step_expects(body: Mapping[str, obj
     deepest = 0.0
     while scene.time < 0.25:
         scene.to_step(scene.steps + 10)
-        assert scene.status in {REACHED, AT_REST}
-        deepest = max(deepest, float(scene.ledger_row()[-1]))
+        assert scene.code in {REACHED, AT_REST}
+        deepest = max(deepest, float(measure_row(scene.scene)[-1]))
     assert deepest > 0.0
     assert tangent_stiffness(HERTZ_MINDLIN, stiffness, deepest) < 1.01 * expected
 
@@ -115,8 +116,8 @@ def test_a_skin_that_a_shaken_support_outruns_is_refused_and_the_least_one_runs_
     high, soft = {"y": 0.2 - hypot(WIDTH, HEIGHT) / 2}, {"stiffness_scale": 1e-4}
     with pytest.raises(SkinTooSmallError) as refusal:
         world_of(high, contact={**soft, "skin": 1e-3 * HEIGHT}, motion=motion)
-    run = Simulation(world_of(high, contact={**soft, "skin": refusal.value.least}, motion=motion))
-    assert run.to_time(0.1).status == REACHED
+    run = SteppedScene(world_of(high, contact={**soft, "skin": refusal.value.least}, motion=motion))
+    assert run.to_time(0.1).code == REACHED
 
 
 sizes = st.floats(1e-3, 1.0)

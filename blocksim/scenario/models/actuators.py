@@ -22,7 +22,6 @@ from blocksim.scenario import units as q
 from blocksim.scenario.models import base, geometry, loads
 from blocksim.scenario.models.base import setting
 
-MOST_REPEATS = 1000
 Sense = Literal["both", "push", "pull"]
 
 
@@ -47,7 +46,7 @@ class Cycles(base.Table):
     kind: Literal["cycles"] = setting("kind of displacement over time")
     amplitudes: tuple[q.PositiveLength, ...] = setting("amplitudes in their order")
     rate: q.PositiveSpeed = setting("full speed of the head")
-    repeats: Annotated[int, base.Whole(1, MOST_REPEATS)] = setting("cycles of each amplitude", 1)
+    repeats: Annotated[int, base.Whole(1, 1000)] = setting("cycles of each amplitude", 1)
     start: q.NonNegativeTime = setting("time at which it begins to move", 0.0)
 
     def _check(self) -> None:

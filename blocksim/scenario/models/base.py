@@ -171,7 +171,7 @@ class SystemTable(Table):
     def impossible(
         self,
         scenario: "Scenario",  # noqa: ARG002 - for those of systems
-        placed: "Sequence[PlacedBody]",  # noqa: ARG002
+        placed: "Sequence[PlacedBody]",  # noqa: ARG002 - for those of systems
     ) -> Iterator[tuple[str, str]]:
         """Yield keys and what is wrong with them, although every value is valid by itself."""
         yield from ()

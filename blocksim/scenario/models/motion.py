@@ -232,7 +232,6 @@ class FromTable(Table):
     start: q.NonNegativeTime = setting("time at which the table's time is zero; the supports rest before", 0.0)
 
 
-MOST_CYCLES = 1000.0
 Shape = Literal["sine", "half-sine", "rectangular", "cosine"]
 SINGLE = ("half-sine", "rectangular")  # shapes of half a cycle, which do not repeat
 ABRUPT = ("rectangular", "cosine")  # shapes that begin at their largest acceleration
@@ -259,7 +258,7 @@ class Pulse(Table):
         "cycles per second; give this or duration (a half-sine, a rectangle: half a cycle)", None
     )
     duration: q.PositiveTime | None = setting("duration of the whole pulse", None)
-    cycles: Annotated[float, q.Quantity(q.NUMBER, above=0.0, at_most=MOST_CYCLES)] = setting(
+    cycles: Annotated[float, q.Quantity(q.NUMBER, above=0.0, at_most=1000.0)] = setting(
         "number of cycles of a sine or cosine, at most 1000", 1.0
     )
     direction: q.Angle = setting("direction of positive acceleration, counter-clockwise from +x", 0.0)

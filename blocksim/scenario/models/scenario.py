@@ -19,7 +19,6 @@ from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.models.timeline import AnyProbe, AnyTime, Event, Explicit, Output, Start
 from blocksim.scenario.structures import AnyStructure
 
-SCHEMA_VERSION = 1
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -30,9 +29,7 @@ class Scenario(Shown, Table):
     that named blocks and materials exist and that no bodies overlap.
     """
 
-    schema_version: Annotated[Literal[1], OneOf((SCHEMA_VERSION,))] = setting(
-        "version of the file format", alias="schema"
-    )
+    schema_version: Annotated[Literal[1], OneOf((1,))] = setting("version of the file format", alias="schema")
     name: Identifier = setting("name of the scenario and of its results folder")
     description: str = setting("free text", "")
     gravity: q.NonNegativeAcceleration = setting("acceleration of gravity", q.USUAL_GRAVITY)

@@ -222,7 +222,6 @@ VALUES_SCHEMA: dict[str, Any] = {
 """JSON Schema of all values of a varied key."""
 
 
-MAX_SAMPLES = 1_000_000
 MAX_SEED = 2**53
 
 Mode = Literal["grid", "list", "table", "lhs", "sobol", "normal"]
@@ -289,7 +288,7 @@ class Sweep(Table):
         "lhs: Latin hypercube; sobol: scrambled Sobol points; normal: independent random draws",
         "grid",
     )
-    samples: Annotated[int, Whole(1, MAX_SAMPLES), pydantic.BeforeValidator(_of_the_mode)] = setting(
+    samples: Annotated[int, Whole(1, 1_000_000), pydantic.BeforeValidator(_of_the_mode)] = setting(
         "number of cases to draw (lhs, sobol, normal; sobol is balanced at powers of two)", 128
     )
     seed: Annotated[int, Whole(0, MAX_SEED), pydantic.BeforeValidator(_of_the_mode)] = setting(

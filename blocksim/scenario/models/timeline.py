@@ -15,8 +15,6 @@ _WORDS = OneOf(get_args(Scheme))
 
 MOST_SLIPS = 2
 """Most typing errors of a scheme, so that its keys are checked as those of the scheme meant."""
-MOST_SUBSTEPS = 1000
-MOST_SWEEPS = 1_000_000
 LEAST_TOLERANCE = 1e-12  # of velocities in m/s; sums of impulses are not more exact
 _TOLERANCE = q.Quantity(q.SPEED, at_least=LEAST_TOLERANCE)
 
@@ -69,7 +67,7 @@ class Nonsmooth(Time):
     contacts = "rigid contacts"
     models_of_outlines = ("surface",)  # the model is not asked for
     scheme: Annotated[Literal["nonsmooth"], _WORDS] = setting("the scheme of this table")
-    substeps: Annotated[int, Whole(1, MOST_SUBSTEPS)] = setting(
+    substeps: Annotated[int, Whole(1, 1000)] = setting(
         "substeps; contacts are detected once per step and solved in every substep", 4
     )
     velocity_tolerance: Annotated[float, _TOLERANCE] | None = setting(
@@ -77,7 +75,7 @@ class Nonsmooth(Time):
         "for a single block, and for up to 99 on supports that move, 0.001 mm/s, from 100 on 100 mm/s)",
         None,
     )
-    velocity_sweeps: Annotated[int, Whole(1, MOST_SWEEPS)] = setting(
+    velocity_sweeps: Annotated[int, Whole(1, 1_000_000)] = setting(
         "maximum number of iterations over all contacts per substep", 1000
     )
     restitution_threshold: q.NonNegativeSpeed = setting("approach speed below which impacts do not rebound", 0.01)

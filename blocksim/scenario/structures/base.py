@@ -13,12 +13,11 @@ from blocksim.scenario import geometry, units as q
 from blocksim.scenario.models.base import Table, Whole, setting
 from blocksim.scenario.models.geometry import Block
 
-MAX_COUNT = 100_000  # of courses, or of blocks in a row
 MAX_BLOCKS = 1_000_000  # in a structure, and in a scenario
 MAX_SEED = 2**32 - 1
 
 Floats = NDArray[np.float64]
-Count = Annotated[int, Whole(1, MAX_COUNT)]
+Count = Annotated[int, Whole(1, 100_000)]  # of courses, or of blocks in a row
 Seed = Annotated[int, Whole(0, MAX_SEED)]
 
 

@@ -12,7 +12,6 @@ from blocksim.scenario.models.base import Whole, require_one, setting
 from blocksim.scenario.models.geometry import COUNTS, Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure, Seed, UnfitError, draws
 
-MOST_VOUSSOIRS = 1000
 MOST_TURN = 0.9 * math.pi
 ABUTMENT = 2.0
 """Width of an abutment in thicknesses of the arch; it is half as deep behind its joint."""
@@ -34,7 +33,7 @@ class Arch(PolygonStructure):
     )
     thickness: q.PositiveLength = setting("thickness of the ring")
     embrace: q.Embrace = setting("angle between the springing joints", math.pi)
-    count: Annotated[int, Whole(1, MOST_VOUSSOIRS)] = setting("number of voussoirs")
+    count: Annotated[int, Whole(1, 1000)] = setting("number of voussoirs")
     abutments: bool = setting("whether fixed blocks hold the springings", default=True)
 
     def _check(self) -> None:
@@ -68,14 +67,11 @@ class Arch(PolygonStructure):
         return cells
 
 
-MOST_DRUMS = 1000
-
-
 class Column(PolygonStructure):
     """Drums of equal height one above the other, their sides on straight lines from the lower to the upper width."""
 
     kind: Literal["column"] = setting("kind of structure")
-    count: Annotated[int, Whole(1, MOST_DRUMS)] = setting("number of drums")
+    count: Annotated[int, Whole(1, 1000)] = setting("number of drums")
     tall: q.PositiveLength = setting("height of the column", alias="height")
     width: q.PositiveLength = setting("width at its foot")
     top_width: q.PositiveLength | None = setting("width at its top (default: width)", None)
@@ -92,7 +88,6 @@ class Column(PolygonStructure):
         ]
 
 
-MOST_CELLS = 5000
 MOST_ROUNDS = 20
 TRIALS = 8  # random points in the box for each cell; a thin region has fewer cells
 LEAST_EDGE, LEAST_WIDTH = 0.02, 0.1
@@ -111,7 +106,7 @@ class Voronoi(PolygonStructure):
     )
 
     kind: Literal["voronoi"] = setting("kind of structure")
-    count: Annotated[int, Whole(1, MOST_CELLS)] = setting("number of cells, before small ones are rejected")
+    count: Annotated[int, Whole(1, 5000)] = setting("number of cells, before small ones are rejected")
     width: q.PositiveLength | None = setting("width of a wall; give this and height, or region", None)
     tall: q.PositiveLength | None = setting("height of a wall", None, alias="height")
     region: tuple[Point, ...] | None = setting(

@@ -160,7 +160,9 @@ NONSMOOTH = schemes.Scheme(
     advance_members=step.advance_nonsmooth_members,
     least_bodies=schemes.BODIES_A_THREAD,
     with_more_room=nonsmooth.with_more_constraints,
-    with_threads=nonsmooth.with_more_threads,
+    with_threads=lambda scene, threads: scene._replace(
+        contacts=scene.contacts._replace(residuals=np.zeros((2, nonsmooth.LINE_WORDS * threads)))
+    ),
     threads_of=lambda scene: int(scene.contacts.residuals.shape[1]) // nonsmooth.LINE_WORDS,
     after_event=renew,
     kernels=lambda _: RIGID,

@@ -20,7 +20,6 @@ from blocksim.study.executors import Batch, BatchSize, RunSetting, Task, ensembl
 from blocksim.study.rows import row_of_error
 
 PATIENCE = 3.0  # s until a scheduler has answered
-GATHERING = 1.0  # s until the rows of a batch that has ended are here
 AHEAD = 2  # batches a thread of a worker
 POLL = 0.1  # s
 TALKERS = {"asyncio", "dask", "distributed", "tornado"}
@@ -130,7 +129,7 @@ class Submission:
         if future.status == "cancelled":
             raise self.scheduler_gone
         try:
-            rows, seconds, host = future.result(timeout=GATHERING)
+            rows, seconds, host = future.result(timeout=1.0)  # s until the rows of a batch that has ended are here
         except InvalidInputError:
             raise
         except TimeoutError:  # the worker that had the rows has died: another one is at it

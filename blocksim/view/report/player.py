@@ -119,9 +119,6 @@ def _places(track: Track, kept: Indices) -> dict[str, Any]:
     return {"count": first.shape[0], "corners": first.shape[1], "shape": shape, **axes}
 
 
-MOST_ARROWS = 200_000  # in all frames of a run
-
-
 def pack_loads(
     frames: trajectory.Frames,
     model: Model,
@@ -143,7 +140,7 @@ def pack_loads(
     if not acts.arrows and acts.turns is None and not any(marks):
         return None
     notes = [note for note in [replace(acts, marks=()).explanation] if note]
-    if sum(one.ends_there.size for one in acts.arrows) > MOST_ARROWS:
+    if sum(one.ends_there.size for one in acts.arrows) > 200_000:  # in all frames of a run
         acts, notes = replace(acts, arrows=()), ["Loads on blocks are not drawn in this page: there are too many."]
     shown: list[dict[str, Any]] = []
     for one in acts.arrows:
@@ -160,7 +157,6 @@ def pack_loads(
 
 
 MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
-CONTACT_BYTES = 16  # of a contact in a frame
 CHANNELS = {"x": "mm", "y": "mm", "rotation": "deg", "vx": "mm/s", "vy": "mm/s", "spin": "deg/s"}
 
 ENDLESS_WIDTHS = 20.0  # of the shown part; how far level ground is drawn to either side
@@ -182,7 +178,7 @@ def pack_frames(frames: trajectory.Frames, most_bytes: int = MOST_BYTES) -> Pack
     Raises InvalidInputError when there is none.
     """
     contacts, blocks, kept = frames.contacts, len(frames.names), run_data.drawable_frames(frames)
-    more = 0 if contacts is None else CONTACT_BYTES * len(contacts.rows) // len(contacts)
+    more = 0 if contacts is None else 16 * len(contacts.rows) // len(contacts)  # of a contact in a frame
     bytes_each = (4 if len(kept) * blocks <= EXACT_VALUES else SHORT_BYTES) * blocks * len(CHANNELS)
     most = max(2, most_bytes // max(1, bytes_each + more + element_bytes(frames, kept)))
     if len(kept) > most and blocks:

@@ -130,7 +130,6 @@ def read_folder(folder: Path) -> PartialRun:
     return PartialRun(folder, model, text, summary, frames, final, tuple(problems), tuple(damage), probes or {})
 
 
-MOST_MAPS = 6  # of a sweep, each over two of its inputs
 COORDINATES = re.compile(r'(?<= (?:d|x|y)=")[^"]*')
 DIGITS = re.compile(r"(\.\d\d)\d+")
 
@@ -169,7 +168,7 @@ def pictures_of(sweep: SweepData) -> list[dict[str, Any]]:
     )
     names = dict(zip((one.key for one in sweep.inputs), short_names([one.key for one in sweep.inputs]), strict=True))
     maps = []
-    for x, y in [*pairs][:MOST_MAPS]:
+    for x, y in [*pairs][:6]:  # of a sweep, each over two of its inputs
         found = outcome_map.map_of(sweep, (x, y))
         with outcome_map.draw_map(sweep, style.OWN, found, by_manner=any(sweep.manners)) as figure:
             label = f"map of {names[y.key]} over {names[x.key]}"

@@ -15,7 +15,6 @@ STAYS_MM = 0.01  # a block whose final x varies less than this is not drawn besi
 DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
 NARROW = 1e-2  # span over middle below which an axis shows distances from the middle
 LEAST_READABLE = 0.01  # in the typed unit: smaller distances from the middle have a prefix of SI instead
-ONE_PERCENT = 0.01
 PREFIXED = ("m", "s", "Pa")
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
@@ -109,7 +108,7 @@ def outcome_label(outcome: tuple[int, ...], most: int = 6) -> str:
 
 def percent(share: float) -> str:
     """Write a share, never rounded to 0 or 100 % unless exact."""
-    if 0.0 < share < ONE_PERCENT:
+    if 0.0 < share < 0.01:
         return f"{100.0 * share:.2g} %"
     return f"{min(round(100.0 * share), 99 if share < 1.0 else 100)} %"
 

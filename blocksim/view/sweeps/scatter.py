@@ -15,11 +15,9 @@ GAP = 0.05  # inches, between panels
 LARGEST, LOWEST = 1.1, 0.35  # inches, of a panel
 SMALL_FONT, NAME_FONT = 6.0, style.FONT_SIZE - 1.0  # points
 NAME_ROOM = 1.5  # inches, of a line of a name; longer ones take several
-LONGEST_LEVEL = 1.0  # inches
 FITTINGS = 4  # smaller panels leave less room for names beside them
 CROWDED = 0.08  # of an axis; a number this near to its start runs into the last one of the panel before
 MOST_INPUTS, MOST_BLOCKS = 9, 3
-BINS = 16
 RARE = 0.5  # percent of run-outs at either end that may lie beyond an axis
 MARGIN = 0.04
 SCATTER = 0.5  # of the distance between levels, over which their dots are spread
@@ -98,7 +96,7 @@ def _right_of(variables: Sequence[Variable], size: float) -> float:
 def _of_input(one: Input, name: str) -> Variable:
     if one.levels:
         spread = SCATTER * (np.arange(len(one.values)) * GOLDEN % 1.0 - 0.5)
-        room = LONGEST_LEVEL * style.POINTS_PER_INCH
+        room = style.POINTS_PER_INCH
         levels = tuple(style.cut_to(level, room, SMALL_FONT) for level in one.levels)
         return Variable(name, one.values + spread, (-0.5, len(levels) - 0.5), levels=levels)
     axis = value_axis(one.values, name, one.unit, is_even=one.is_even, typed=one.typed)
@@ -123,7 +121,7 @@ def _draw_panel(axes: "style.Axes", sweep: SweepData, up: Variable, across: Vari
     """
     if up is across:
         spread = np.geomspace if up.is_log else np.linspace
-        edges = spread(*up.limits, BINS + 1)
+        edges = spread(*up.limits, 17)
         for cases, colour in ((sweep.finished, OUTSIDE["color"]), (sweep.inside, INSIDE["color"])):
             if cases is not None:
                 counts, _ = np.histogram(up.values[cases], edges)
@@ -208,11 +206,8 @@ def _entries(sweep: SweepData) -> list[Any]:
 SIDES = 0.55, 0.2, 0.32, 0.42  # inches, around the panels of a histogram
 PANEL_HEIGHT, ROW_GAP, ROOM = 1.15, 0.62, 0.26  # inches; ROOM is above the bars, for the repeats
 LEAST_PANEL = 1.85, 0.6  # inches, of a panel where a size was asked for
-BLOCK_ROOM = 1.2  # inches, for the name of a block
-MOST_HISTOGRAMS = 4
 MANY_BINS = 40
 RARE_RUN_OUTS = 1.0  # percent at either end that may lie beyond the axis
-LEAST_BIN_MM = 0.01
 ALL_COLOUR, INSIDE_COLOUR = "#B5D6EA", "#0072B2"
 _MARK: dict[str, Any] = {"marker": "|", "color": style.MEASURED_COLOUR, "zorder": 4}
 _REPEATS: dict[str, Any] = {**_MARK, "linestyle": "", "markersize": 7.0, "markeredgewidth": 1.1}
@@ -222,7 +217,7 @@ _INTERVAL: dict[str, Any] = {**_MARK, "markersize": 4.0, "linewidth": 1.0}
 @contextmanager
 def draw_histogram(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[style.Figure]":
     """Give a panel for each block that moves."""
-    blocks = sweep.movers[-MOST_HISTOGRAMS:]
+    blocks = sweep.movers[-4:]
     own = style.COLUMN_WIDTH - sum(SIDES[:2]), PANEL_HEIGHT
     more: dict[str, Any] = {"title": sweep.title, "handles": _entries_histogram(sweep), "columns": 2}
     with style.open_panels(paper, [1] * len(blocks), own, LEAST_PANEL, SIDES, (0.0, ROW_GAP), **more) as opened:
@@ -235,7 +230,7 @@ def draw_histogram(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterato
 def limits_of(x_mm: run_data.Floats, others: run_data.Floats) -> tuple[float, float]:
     """Return the ends of an axis (mm) around all but the rarest run-outs and everything measured."""
     ends = np.concatenate([np.percentile(x_mm, [RARE_RUN_OUTS, 100.0 - RARE_RUN_OUTS]), others])
-    return style.limits_around(ends, 0.04, MANY_BINS * LEAST_BIN_MM)
+    return style.limits_around(ends, 0.04, MANY_BINS * 0.01)
 
 
 def _draw_block(axes: "style.Axes", sweep: SweepData, block: int, room: float) -> None:
@@ -264,7 +259,7 @@ def _draw_block(axes: "style.Axes", sweep: SweepData, block: int, room: float) -
         style.number_axis(side)
     axes.set_yticks([tick for tick in axes.get_yticks() if tick <= top])
     axes.set_ylabel("cases (%)")
-    shown = style.cut_to(name, BLOCK_ROOM * style.POINTS_PER_INCH, style.FONT_SIZE)
+    shown = style.cut_to(name, 1.2 * style.POINTS_PER_INCH, style.FONT_SIZE)  # inches, for the name of a block
     axes.set_xlabel(f"final x of block {shown} (mm)", labelpad=2.0)
     beyond = int(((x < low) | (x > high)).sum())
     axes.set_title(

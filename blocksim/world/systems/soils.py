@@ -136,11 +136,6 @@ def known_errors(model: Model) -> Iterator[str]:
         if isinstance(load, loads.Horizontal | loads.Gravity):
             key = overrides.format_key(("loads", load.name or number))
             yield f"{key}: soil does not feel this load, blocks alone do; ground.tilt turns the gravity of both"
-    yield from weak_thrusts(model)
-
-
-def weak_thrusts(model: Model) -> Iterator[str]:
-    """Yield a warning for each soil beside blocks that may yield, whose thrust on them is known to be too small."""
     for soil in model.soils:
         is_rough = friction_with(model.scenario, soil.material, GROUND, ground=True).static > 0.0
         if is_rough and _is_beside_a_block(model.bodies, soil):

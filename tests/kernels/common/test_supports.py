@@ -14,7 +14,7 @@ from blocksim.kernels.common.mechanics import accelerate_and_kick
 from blocksim.kernels.common.members import Watched, frame_to_watch, watch
 from blocksim.kernels.common.supports import acceleration, displacement, tally_moved
 from blocksim.scenario import Model
-from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
+from blocksim.verification.scene import HEIGHT, SteppedScene, scenario_of
 from blocksim.world.build import build_world
 
 
@@ -61,7 +61,7 @@ def on_support(
     change: Callable[[World], None] | None = None,
     time: Mapping[str, object] | None = None,
     **tables: Any,
-) -> Simulation:
+) -> SteppedScene:
     """Start soft blocks on a support that moves along `direction` (rad); None: that rests."""
     scenario = scenario_of(
         bodies,
@@ -76,7 +76,7 @@ def on_support(
         world.controls.motion_x, world.controls.motion_y = cos(direction), sin(direction)
     if change is not None:
         change(world)
-    return Simulation(world)
+    return SteppedScene(world)
 
 
 @given(seed=st.integers(0, 1000), time=st.floats(0.5, 1.5))
@@ -143,7 +143,7 @@ def test_rest_is_not_found_before_the_support_has_stopped(last: tuple[float, ...
     rest = {"stop_at_rest": True, "rest_speed": 2e-3, "rest_hold": 2e-3}
     creeping = pieces_of((0.0, 0.0, 1e-3), (0.01, 1e-5, -1e-3), last)
     scene = on_support([LYING], creeping, time=rest).to_time(0.06)
-    assert scene.status == (AT_REST if len(last) == 1 else REACHED)
+    assert scene.code == (AT_REST if len(last) == 1 else REACHED)
     assert scene.time > 0.02
 
 

@@ -24,6 +24,7 @@ from blocksim.kernels.explicit.kinematics import Point, point_of, resolve_point,
 from blocksim.kernels.explicit.laws import LINEAR, spring_at
 from blocksim.verification.scene import HEIGHT, WIDTH
 from tests.conftest import PaperBlock, Start
+from tests.contacts import contact_records
 from tests.kernels.references import dashpots_by_definition, delassus, rates_of_points
 from tests.kernels.scenes import make_body, pose
 
@@ -52,7 +53,7 @@ def test_corner_that_slides_rebounds_as_asked(start: Start, restitution: float, 
     falling = {"y": 1e-7 - y, "angle": turned, "velocity": [3.0 * way, -speed]}
     scene = start([falling], restitution=restitution, ground_friction=friction, gravity=0.0)
     scene.to_step(20)
-    while scene.contacts > 0:
+    while scene.contact_count > 0:
         scene.to_step(scene.steps + 5)
     block = scene.bodies[0]
     assert way * (block.vx - block.spin * y) > 0.0  # it has slid all the time
@@ -109,7 +110,7 @@ def test_own_force_counts_more_where_more_than_two_pairs_act_on_a_body(of_a: int
 
 def test_sliding_block_has_its_springs_at_the_cone(start: Start, paper_block: PaperBlock) -> None:
     slide = start([{"y": paper_block.height / 2, "velocity": [-0.5, 0.0]}], contact=SOFT).to_time(0.02)
-    world, touching = slide.world, slide.contact_records
+    world, touching = slide.world, contact_records(slide.world)
     stiffness = float(world.interactions[1, 0].normal_stiffness * world.interactions[1, 0].shear_ratio)
     assert touching.size == 2
     assert abs(touching.shear_force) == pytest.approx(0.38 * touching.normal_force, rel=1e-12)

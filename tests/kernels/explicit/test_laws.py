@@ -44,7 +44,7 @@ def test_restitution_is_the_one_asked_at_any_speed(start: Start, paper_block: Pa
     for speed in (0.02, 0.5, 5.0):
         lying = {"y": paper_block.height / 2 + 1e-9, "velocity": [0.0, -speed]}
         scene = start([lying], restitution=e, gravity=0.0, ground_friction=0.0, contact=SOFT_HERTZ)
-        while scene.contacts or scene.bodies[0].vy < 0.0:
+        while scene.contact_count or scene.bodies[0].vy < 0.0:
             scene.to_step(scene.steps + 1)
         assert scene.bodies[0].vy == pytest.approx(e * speed, abs=0.01 * speed)
         assert scene.residual() < 1e-3

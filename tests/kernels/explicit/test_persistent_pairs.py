@@ -23,7 +23,7 @@ from blocksim.kernels.explicit.persistent_forces import (
 )
 from blocksim.kernels.explicit.sides import MOST_CORNERS, into_world, next_number, number_before
 from blocksim.kernels.explicit.sliver_axes import is_sliver, meets_along
-from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, SteppedScene
 from tests.conftest import Start
 from tests.kernels.scenes import pose
 
@@ -235,7 +235,7 @@ SHARP = [[-1.0, -0.2], [1.0, -0.2], [-0.8, 0.9]]
 QUADRANGLE = [[-1.0, -0.5], [1.2, -0.7], [0.6, 0.8], [-0.9, 0.4]]
 
 
-def of_two(one: list[list[float]], two: list[list[float]]) -> Simulation:
+def of_two(one: list[list[float]], two: list[list[float]]) -> SteppedScene:
     return CaseScene([{"y": 1.0, "outline": one}, {"y": 5.0, "outline": two}], gravity=0.0).start()
 
 

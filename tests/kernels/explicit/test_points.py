@@ -190,13 +190,13 @@ def test_seats_are_known_before_a_block_comes_down_on_them(start: Start) -> None
     scene = start([left, right, block], gravity=0.0)
     body = scene.world.bodies[2]
     scene.to_step(3 * SHARE_PERIOD)
-    assert scene.contacts == 0
+    assert scene.contact_count == 0
     stiffness = 2.0 * float(scene.world.interactions[1, 1].normal_stiffness)
     assert (body.seats, body.k_xx) == (2, 0.0)
     assert body.k_yy == pytest.approx(stiffness)
     assert body.k_y == pytest.approx(0.0, abs=1e-9 * stiffness * WIDTH)
     scene.to_step(3 * SHARE_PERIOD + 2)
-    assert scene.contacts == 4
+    assert scene.contact_count == 4
 
 
 SPACING = 1e-3

@@ -16,7 +16,8 @@ from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.models.surface import near_slots
 from blocksim.kernels.explicit.sides import MOST_CORNERS, cone_of
 from blocksim.kernels.explicit.sliver_axes import Axis, nearest_axis
-from blocksim.verification.scene import CaseScene, Simulation
+from blocksim.verification.scene import CaseScene, SteppedScene
+from tests.contacts import contact_records
 
 Outline = list[list[float]]
 RADIUS = 0.02  # m
@@ -49,7 +50,7 @@ SLIVERS: dict[str, tuple[Outline, float, Outline, float, float, float]] = {
 
 def struck(
     below: Outline, angle: float, above: Outline, turn: float, x: float, speed: tuple[float, float], **contact: object
-) -> tuple[Simulation, float]:
+) -> tuple[SteppedScene, float]:
     """Return a block that has struck another one, elastic and smooth, and the kinetic energy (J) before."""
     high = max(sin(angle) * u + cos(angle) * v for u, v in below)
     low = min(sin(turn) * u + cos(turn) * v for u, v in above)
@@ -246,7 +247,7 @@ def test_elastic_impact_keeps_its_energy_where_corners_pass_one_another(name: st
     run, before = struck(below, angle, above, turn, x, speed, law=law, stiffness_scale=scale)
     assert run.mechanical == pytest.approx(before, rel=1e-3)
     if "rectangle" in name:
-        assert run.to_step(2 * STEPS).contacts == 0
+        assert run.to_step(2 * STEPS).contact_count == 0
         assert run.bodies[1].spin != 0.0
         assert run.mechanical == pytest.approx(before, rel=1e-3)
 
@@ -314,9 +315,9 @@ def test_no_end_of_a_face_is_lost_between_two_sharp_corners() -> None:
             world.bodies[1].y -= depth
 
         run = CaseScene(bodies, gravity=0.0, restitution=1.0).start(press)
-        contacts = run.contact_records
+        contacts = contact_records(run.world)
         assert contacts.depth == pytest.approx([depth, depth], rel=1e-6)
         assert run.bodies[1].ay * run.bodies[1].mass == pytest.approx(contacts.normal_force.sum(), rel=1e-9)
         assert abs(run.bodies[1].spin_rate) * 0.03 < 1e-3 * run.bodies[1].ay
         run.to_step(3)
-        assert run.contacts == 2
+        assert run.contact_count == 2

@@ -20,7 +20,7 @@ import math
 from blocksim.kernels.explicit.persistent_forces import TOUCHING, persistent_forces
 from blocksim.scenario.document import scenario_from_mapping
 from blocksim.scenario.laws import LAWS
-from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, SteppedScene
 from blocksim.world.interactions import damping_ratio
 
 LAW = LAWS["power-1.25"]

@@ -16,7 +16,7 @@ from blocksim.kernels.nonsmooth.arrays import FAR, Nonsmooth
 from blocksim.kernels.nonsmooth.cuts import set_length
 from blocksim.kernels.nonsmooth.impact_rounds import find_contact_groups
 from blocksim.kernels.nonsmooth.passes import solve_two
-from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, SteppedScene, scenario_of
 from tests.kernels.scenes import Block, after_substep, begin, collided, listed_constraints, posed, single
 
 G = 9.81
@@ -62,21 +62,21 @@ def test_edges_of_pieces_of_ground() -> None:
 
 @pytest.mark.parametrize(("most", "status"), [(1e-6, OVERLAP_LIMIT), (2e-6, 0)])
 def test_overlap_beyond_the_limit_stops_the_run(most: float, status: int) -> None:
-    assert single([{"y": ON_GROUND}], restitution=0.0, contact={"max_overlap": most}).to_time(0.05).status == status
+    assert single([{"y": ON_GROUND}], restitution=0.0, contact={"max_overlap": most}).to_time(0.05).code == status
 
 
 def test_state_that_is_not_finite_stops_the_run() -> None:
     run = single([{"y": 0.1}]).to_step(3)
     run.world.bodies.spin[0] = np.nan
     run.scene.contacts.states.vy[0] = np.nan
-    assert run.to_step(10).status == NOT_FINITE
+    assert run.to_step(10).code == NOT_FINITE
 
 
 SMOOTH: dict[str, Any] = {"friction": 0.0, "ground_friction": 0.0}
 HOPPING = {"x": 1.0, "y": ON_GROUND + 2e-3, "velocity": [0.0, -0.3]}  # at most every 30 ms
 
 
-def cut_steps(run: Simulation, count: int) -> int:
+def cut_steps(run: SteppedScene, count: int) -> int:
     """Go on for some steps; return how many of them were cut."""
     stepping = run.scene.contacts.stepping[0]
     return sum(int(run.to_step(run.steps + 1) is run and stepping.cuts > 0) for _ in range(count))
@@ -137,7 +137,7 @@ def shaken(acceleration: float, *bodies: dict[str, Any], direction: str = "0 deg
     return scenario_of(bodies or [LYING], motion=motion, **{**more, "time": {"stop_at_rest": False}, **tables})
 
 
-def table(run: Simulation) -> float:
+def table(run: SteppedScene) -> float:
     """Return how far (m) the support has gone along x."""
     return float(run.world.bodies.x[-1])
 
@@ -304,7 +304,7 @@ def thrown(random: np.random.Generator) -> dict[str, Any]:
     return {"y": height, "angle": angle, "velocity": velocity, "spin": float(10.0 * random.normal())}
 
 
-def first_impact(run: Simulation) -> tuple[float, float]:
+def first_impact(run: SteppedScene) -> tuple[float, float]:
     """Step until a block has met the ground; return its upward momentum (m/s) and what energy it gained."""
     speed, energy = float(run.bodies.vy[0]), run.kinetic
     while run.steps < 50 and run.bodies.vy[0] == speed:

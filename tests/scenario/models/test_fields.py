@@ -20,7 +20,6 @@ from blocksim.scenario import (
     json_schema,
     load_scenario,
     scenario_from_mapping,
-    scenario_hash,
     scenario_to_toml,
 )
 from blocksim.scenario.geometry import edge_distance
@@ -107,7 +106,7 @@ def test_a_resolved_ratio_is_the_same_scenario_and_the_same_run_as_its_value() -
     by_ratio = document.with_values({SIDE: {"static": 0.31, "kinetic_ratio": 0.62}}).build()
     by_value = document.with_values({SIDE: {"static": 0.31, "kinetic": 0.31 * 0.62}}).build()
     assert Document.parse(scenario_to_toml(by_ratio)).build() == by_ratio
-    assert scenario_hash(by_ratio) == scenario_hash(by_value)
+    assert Model(by_ratio).hash == Model(by_value).hash
 
 
 CUBE = {"width": 1, "height": 1, "length": 1, "material": "oak"}
@@ -146,7 +145,7 @@ def test_a_table_is_read_and_the_resolved_scenario_needs_it_no_more(tmp_path: Pa
         (tmp_path / name).unlink()
     again = load_scenario(tmp_path / "scenario.toml")
     assert again == read
-    assert scenario_hash(again) == scenario_hash(read)
+    assert Model(again).hash == Model(read).hash
 
 
 def test_a_load_is_set_by_its_name() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import Model, geometry, placement, scenario_from_mapping, scenario_hash, scenario_to_toml, start
+from blocksim.scenario import Model, geometry, placement, scenario_from_mapping, scenario_to_toml, start
 from blocksim.scenario.models.soil import SoilTable
 from tests.soils import MATERIALS, column, data_of, scene
 
@@ -38,12 +38,12 @@ def test_soils_may_touch_what_they_stand_beside() -> None:
 
 def test_the_hash_changes_with_what_and_where_a_soil_is() -> None:
     table = column(0.05, 0.05, 0.005)
-    hashes = {scenario_hash(scene(table))}
+    hashes = {Model(scene(table)).hash}
     for material in ({"friction_angle": "22 deg"}, {"cohesion": 1.0}, {"yield_surface": "plane-strain-associated"}):
         materials = {**MATERIALS, "rods": {**MATERIALS["rods"], **material}}
-        hashes.add(scenario_hash(scene(table, materials=materials)))
+        hashes.add(Model(scene(table, materials=materials)).hash)
     for place in ({"y": [0.0, 0.06]}, {"spacing": 0.0025}, {"start": "ramp"}, {"gradient": "raw"}):
-        hashes.add(scenario_hash(scene({**table, **place})))
+        hashes.add(Model(scene({**table, **place})).hash)
     assert len(hashes) == 1 + 3 + 4
 
 
