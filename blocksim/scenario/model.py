@@ -78,14 +78,13 @@ class Model:
 
     Examples
     --------
-    >>> model = Model({
-    ...     "schema": 1,
-    ...     "name": "two bricks",
-    ...     "materials": {"clay": {"density": 1800.0, "young_modulus": "5 GPa", "poisson_ratio": 0.2}},
-    ...     "blocks": {"brick": {"width": 0.2, "height": 0.1, "depth": 0.1, "material": "clay"}},
-    ...     "structures": [{"kind": "stack", "block": "brick", "count": 2}],
-    ... })
-    >>> [(body.name, body.mass, body.y) for body in model.bodies]
+    >>> from blocksim import Model
+    >>> model = Model("scenarios/three_blocks.toml")
+    >>> [(body.name, round(body.x, 3), round(body.mass, 3)) for body in model.bodies]
+    [('1', 0.016, 0.109), ('2', 0.038, 0.109), ('3', 0.06, 0.109)]
+    >>> smooth = model.varied({"friction.block_block": 0.1})
+    >>> smooth.bodies is model.bodies
+    True
     """
 
     scenario: Scenario
@@ -168,14 +167,6 @@ class Model:
         ScenarioError
             Where a key leads nowhere, or a scenario with these values is not valid: with the mistakes that are found
             when it is loaded.
-
-        Examples
-        --------
-        >>> smooth = model.varied({"friction.block_block": 0.1})
-        >>> smooth.scenario.friction.block_block.kinetic
-        0.1
-        >>> smooth.bodies is model.bodies
-        True
         """
         changed = self.document.with_values(settings)
         tables = {str(one.path[0]) for one in changed.overrides[len(self.document.overrides) :]}

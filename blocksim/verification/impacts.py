@@ -252,9 +252,8 @@ ROUND_OFF = 1e-12
 RIGID_LEDGER_TOLERANCE = 1e-11  # what impulses take is known to round-off
 # Blocks of 1 to 10 MN, whose weights do 1e5 to 1e6 times the energy in play on their heights: every step rounds that by
 # 1e-16, and the dam lies for 30 000 of them. Nothing else drifts: friction, impacts and loads balance to 1e-13. The
-# slope of cells has 119 MJ of potential energy, and hardly anything in play at first. The granite wall has its 100 kN
-# at once here: the work of loads is the trapezoid rule's, and that of the first substep begins at none.
-HEAVY = {"dam": 1e-8, "toppling_slope": 1e-10, "voronoi_slope": 1e-10, "granite_wall": 1e-5}
+# slope of cells has 119 MJ of potential energy, and hardly anything in play at first.
+HEAVY = {"dam": 1e-8, "toppling_slope": 1e-10, "voronoi_slope": 1e-10}
 SOFT = 0.01  # stiffness scale of the quick size; crowds keep their own
 LESS_SOFT = 0.1  # with driven bodies: what starts at full speed is off by half a step of it, before anything has fallen
 STIFFER = 10.0  # where the scenario's own stiffness is too soft for a law
