@@ -38,9 +38,22 @@ def test_example_of_the_package_prints_what_it_says(monkeypatch: pytest.MonkeyPa
     assert doctest.testmod(blocksim) == (0, 4)
 
 
+@pytest.mark.parametrize("name", blocksim.__all__)
+def test_example_of_a_function_prints_what_it_says(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
+    public = {one: getattr(blocksim, one) for one in blocksim.__all__}
+    (example,) = doctest.DocTestFinder(recurse=False).find(public[name], name, module=False, globs=public)
+    assert example.examples
+    assert doctest.DocTestRunner().run(example).failed == 0, capsys.readouterr().out
+
+
 def test_help_lists_every_public_function() -> None:
     text = pydoc.plain(pydoc.render_doc(blocksim))
-    assert [name for name in blocksim.__all__ if f"    {name}(" not in text and f"    {name} = " not in text] == []
+    forms = ("    {}(", "    {} = ", "    class {}(")
+    assert [name for name in blocksim.__all__ if not any(form.format(name) in text for form in forms)] == []
 
 
 def test_completion_of_the_package_offers_the_functions_for_users_alone() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple, Self, cast
+from typing import NamedTuple, Protocol, Self, cast, runtime_checkable
 
 from blocksim.errors import InputMissingError, Problem, ScenarioError
 from blocksim.scenario import check, input_files, mistakes, overrides as keys, resolution, units
@@ -382,7 +382,14 @@ class Document:
         return inside or (bool(found) and on_the_way) or beside
 
 
-Source = Path | str | Mapping[str, object] | Scenario | Document
+@runtime_checkable
+class HasDocument(Protocol):
+    """A model, with the text of its scenario."""
+
+    document: Document
+
+
+Source = Path | str | Mapping[str, object] | Scenario | Document | HasDocument
 """What a scenario can be loaded from."""
 
 
@@ -394,6 +401,9 @@ def load_scenario(
     `overrides` are "key=value" texts as given to --set, or dotted keys with Python values. Tables that the file names
     must lie below its folder or below the current one, unless `allow_outside` is given or an override names them.
     Raises ScenarioError with all mistakes together, and InputMissingError where the file itself cannot be read.
+
+    >>> load("scenarios/slide.toml", {"gravity": "1.62 m/s^2"}).gravity
+    1.62
     """
     document = document_of(source)
     document = replace(document, allow_outside=allow_outside or document.allow_outside)
@@ -418,6 +428,9 @@ def replace_values(scenario: Scenario, changes: Mapping[str, object]) -> Scenari
 
     `changes` are dotted keys with Python values or strings with a unit: {"ground.tilt": "10 deg"}. The given
     scenario is unchanged. Raises ScenarioError with all mistakes together.
+
+    >>> replace(load("scenarios/slide.toml"), {"friction.block_ground": 0.5}).friction.block_ground.kinetic
+    0.5
     """
     return load_scenario(scenario, changes)
 
@@ -429,6 +442,8 @@ def document_of(source: Source) -> Document:
     """
     if isinstance(source, Document):
         return source
+    if isinstance(source, HasDocument):
+        return source.document
     if isinstance(source, Scenario):
         return replace(Document.parse(resolution.scenario_to_toml(source), source.name), allow_outside=True)
     return Document.from_mapping(source) if isinstance(source, Mapping) else Document.read(source)

@@ -89,7 +89,7 @@ class Model:
 
     scenario: Scenario
 
-    def __init__(self, source: "Source | Model") -> None:
+    def __init__(self, source: Source) -> None:
         """Check the scenario, unless it has been checked; a model shares its answers."""
         if isinstance(source, Model):
             vars(self).update(vars(source))
@@ -97,13 +97,12 @@ class Model:
         self.kept: dict[Derived[Any], Any] = {}
         self.origin: Model | None = None  # of which this is a variation,
         self.changed: Collection[str] = ()  # by these tables
-        self._document: Document | None = None
         if isinstance(source, Scenario):
             self.scenario = source
             return
-        self._document = document_of(source)
-        self.scenario, placed = self._document.examined()
-        self.kept[vars(Model)["placement"]] = placed
+        document = document_of(source)
+        self.scenario, placed = document.examined()
+        self.kept |= {vars(Model)["document"]: document, vars(Model)["placement"]: placed}
 
     @classmethod
     def stored(cls, path: Path) -> Self:
@@ -122,13 +121,8 @@ class Model:
         """Take a scenario that has been checked."""
         self.__init__(scenario)  # type: ignore[misc]
 
-    @property
-    def document(self) -> Document:
-        """The text of the scenario, in which mistakes are shown."""
-        if self._document is None:
-            self._document = document_of(self.scenario)
-        return self._document
-
+    document = derived(*Scenario.model_fields)(lambda model: document_of(model.scenario))
+    """The text of the scenario, in which mistakes are shown."""
     placement = derived(*GEOMETRY)(lambda model: places.place(model.scenario))
     """All blocks, and the structure or single body that each comes from."""
     bodies = derived(*GEOMETRY)(lambda model: model.placement.bodies)
@@ -189,7 +183,8 @@ class Model:
             return None
         parts = {name: getattr(one, name) for name, one in read.items()}
         model = Model(self.scenario.model_copy(update=parts))
-        model._document, model.origin, model.changed = changed, self, tables
+        model.origin, model.changed = self, tables
+        model.kept[vars(Model)["document"]] = changed
         with changed.file_access():
             mistakes = check.mistakes_among(
                 changed.data, changed.folder, model.scenario, lambda: model.placement, tables

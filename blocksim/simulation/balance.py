@@ -23,8 +23,7 @@ SMALLEST_HEIGHT = 1e-3  # m; the energy in play is at least that of lifting ever
 RESIDUAL_LIMIT = 0.05  # of the energy in play; a run beyond this has no meaning
 RESIDUAL_PROMISE = 1e-3  # of the energy in play; beyond this a warning is due
 FIRST_CHECK = 1000  # steps
-RARER = 4  # times as many steps between two checks as before ...
-BODY_STEPS = 200_000  # ... until they cost less than a hundredth of the steps between them
+BODY_STEPS = 200_000  # of bodies between two checks; before, each is four times as far from the last one as that was
 
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]  # JSON has no NaN
 
@@ -116,7 +115,7 @@ def next_energy_check(done: int, bodies: int) -> int:
     """Return the first step after `done` at which the energy is checked, in a scene of so many bodies."""
     period = FIRST_CHECK
     while period <= done and period * bodies < BODY_STEPS:
-        period *= RARER
+        period *= 4
     return (done // period + 1) * period
 
 

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NEVER = np.iinfo(np.int64).max
-NO_SIZE = -1e12  # m: half sides of what is not there: farther than that from everything
 NOT_THERE = {"mass", "inertia", "inverse_mass", "inverse_inertia"}
 RATES = ("vx", "vy", "spin")
 ACCELERATIONS = ("ax", "ay", "spin_rate")
@@ -140,7 +139,7 @@ def remove_body(world: arrays.World, number: int) -> arrays.World:
     body = world.bodies[number]
     world = _without(world, number)
     body.is_moved = arrays.REMOVED
-    body.half_x = body.half_y = NO_SIZE
+    body.half_x = body.half_y = -1e12  # m: half sides of what is not there: farther than that from everything
     body.faces = body.corners = body.particle_count = 0
     for name in OF_FREE_BODIES:
         body[name] = 0
@@ -276,7 +275,6 @@ def _name(world: arrays.World, placed: Sequence[PlacedBody], body: int) -> str:
     return "a wall" if is_wall else "the ground"
 
 
-CALL_SECONDS = 0.05
 LONGEST_CALL = 0.2  # s, with all that is sampled on the way
 BODY_STEPS_AT_FIRST = 100_000  # ten milliseconds or so; particles and rigid contacts take longer
 MOST_GROWTH = 4  # from one call to the next: the first steps of a scene may be quick, as nothing touches
@@ -388,7 +386,7 @@ def steps_of_call(before: int, steps: int, seconds: float) -> int:
     So that signals and limits take effect soon and progress is shown; `before` is what that call was allowed. No bits
     depend on where calls end.
     """
-    fitting = CALL_SECONDS * steps / max(seconds, 1e-9)
+    fitting = 0.05 * steps / max(seconds, 1e-9)
     return max(1, int(min(fitting, MOST_GROWTH * max(steps, before)))) if steps > 0 else before
 
 
@@ -441,7 +439,7 @@ class Simulation:
     settled: results.RestState | None = None  # how the scene came to rest before time zero, where it did
     probe_channels: instruments.Probes = instruments.NO_PROBES
 
-    def __init__(self, source: Source | Model, *, threads: int = 1) -> None:
+    def __init__(self, source: Source, *, threads: int = 1) -> None:
         """Build the scene and let it settle where the scenario says so; time is zero then."""
         self.model = model = Model(source)
         schemes.compile_kernels(schemes.kernels_of(model.scenario))

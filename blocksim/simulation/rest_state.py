@@ -41,7 +41,6 @@ from blocksim.world.build import arrays_of
 
 PARTS = 50  # in which gravity and loads grow
 BALANCE = 1e-8  # of gravity (and of the strongest load): accelerations at rest
-ROUGH_BALANCE = 1e-3  # the same while loads grow
 FIRST_SHARE, LAST_SHARE = 0.25, 1e-3  # of the inertial force: parts in which it grows, halved where one is too much
 UNASKED_SHARE = 0.01  # of the smallest side of a block: way in settling that was not asked for; what was to drop drops
 MOVED_SHARE = 0.25  # of the smallest side of a block: soft springs give way by as much as a tenth, what falls goes on
@@ -251,7 +250,7 @@ class _Settlement:
             end = self.steps + self.pace.part
             while self.steps < end:
                 self._go()
-                if self._unrest() <= ROUGH_BALANCE / PARTS:
+                if self._unrest() <= 1e-3 / PARTS:  # of gravity: near enough while loads grow
                     break
         self.since, self.speeds = self._places(), []  # what moved faster under growing loads is no mechanism yet
 

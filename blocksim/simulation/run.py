@@ -54,8 +54,6 @@ def bytes_needed(model: Model, scene: schemes.AnyScene) -> int:
     return series + memory.run_bytes(bodies, frames, contacts, systems.others_of(model)) + CHECKPOINT_FILES * state
 
 
-GAINED = 0.5  # a/w
-PROMISE = 5e-3  # error of a slip
 UNSOLVED_SHARE = 0.01  # of all velocity passes: beyond this a warning is due
 MILLI = 1e3
 SAMPLES = 20_000  # of twice the duration of a pulse
@@ -74,10 +72,10 @@ def _onset_warnings(model: Model, world: arrays.World, settled: results.RestStat
         stiffness = 2.0 * float(values["normal_stiffness"] * values["shear_ratio"])
         limit = float(values["kinetic_friction"]) * scenario.gravity
         if stiffness > 0.0 and limit < pulse.amplitude and not one.fixed:
-            gained = GAINED * pulse.amplitude * math.sqrt(one.mass / stiffness)
+            gained = 0.5 * pulse.amplitude * math.sqrt(one.mass / stiffness)  # a/w
             errors.append((gained / mean_slip_rate(model, limit), one.name))
     worst, name = max(errors)
-    if worst > PROMISE:
+    if worst > 5e-3:  # error of a slip
         yield (
             f"the pulse begins at its peak: springs give way before block {name} slips, and its slip is some "
             f"{worst:.1%} too large (as 1/sqrt(contact.stiffness_scale)); begin the pulse at time zero, or raise the "

@@ -33,7 +33,6 @@ STARTS = (0.0, 0.25, 0.5)  # of the bound: where an estimate begins
 FLAT = 1e-3  # of the coefficient of friction: tangent of the angle at which joints of an estimate open
 NEAR = 1e-2  # of the factor: what it counts that normal forces differ from the last ones by the whole weight
 EVEN = 1e-3  # of the greatest normal force: what the sum of all counts beside it
-ADMISSIBLE = 1e-5  # of the weight: excess of shear that is none
 UNBOUNDED, INFEASIBLE = 3, 2  # as linprog numbers its answers
 
 
@@ -137,7 +136,7 @@ class Programme:
             if result is None or result.status == UNBOUNDED:
                 break
             normal, shear = result.x[:points], result.x[points : 2 * points]
-            if (np.abs(shear) <= friction * normal + ADMISSIBLE).all():
+            if (np.abs(shear) <= friction * normal + 1e-5).all():  # of the weight: excess of shear that is none
                 return float(result.x[-1])
         return np.inf
 

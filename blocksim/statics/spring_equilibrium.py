@@ -39,17 +39,13 @@ DRAG = 1e-3  # of the stiffest contact, at h = 1
 FIRST, LEAST = 1e2, 1e-9  # h
 GROWTH, SHRINKAGE, CAREFUL = 10.0, 0.1, 2.0  # of h after success, after failure, and after the next success
 ITERATIONS, PATIENCE = 15, 5  # of Newton's method in a step, and without halving what is left
-STICKY = 1e3  # times the friction, in a first guess without slip
-CREEP = 1e-4  # of the drag, in that guess
 SHORTENINGS, HALF = 2, 0.5  # lengths of a step of Newton's method that are tried, each half of the one before
-DESCENT = 0.2  # of what is left, by which a whole step has to bring it down
 LONGEST = 10.0  # of the overlap of one contact that bears all: a step of Newton's method
 EVALUATIONS = 2000  # calibrated: beyond it time steps are as fast
 SLIGHT, FAILURES = 1e-3, 3  # unrest that steps of a run end, after steps of creep that fail one after the other: forces
 # jump by less where an end of a contact passes another
 LOOKS_BACK = 4  # steps of creep over which unrest is compared
 FAR = 50.0  # calibrated: times the deepest overlap, where creep grows faster
-LEAST_FAR = 2e-4  # of the smallest side of a block: the same
 FADES = 0.95  # of the unrest LOOKS_BACK steps before, or at first: what comes to rest has less
 VELOCITIES, ACCELERATIONS = ("vx", "vy", "spin"), ("ax", "ay", "spin_rate")
 DASHPOTS = ("normal_left", "shear_left")
@@ -279,7 +275,7 @@ class _Search:
                 square = self._square(found - drag * (after - before) / self.forces.masses)
                 if square < best[0]:
                     best = square, after, found
-                if square < (1.0 - DESCENT * share) * left:
+                if square < (1.0 - 0.2 * share) * left:  # of what is left, by which a whole step has to bring it down
                     break
             share *= HALF
         return best[1:]
@@ -289,8 +285,8 @@ class _Search:
         values, names = self.forces.interactions_now, ["static_friction", "kinetic_friction"]
         friction = values[names].copy()
         for name in names:
-            values[name] = STICKY * friction[name]
-        result = self.solved(np.zeros_like(self.drag), self.closed, CREEP * self.drag)
+            values[name] = 1e3 * friction[name]  # times the friction, in a first guess without slip
+        result = self.solved(np.zeros_like(self.drag), self.closed, 1e-4 * self.drag)  # of the drag, in that guess
         for name in names:
             values[name] = friction[name]
         return result.displacements if result.is_solved else self.closed
@@ -327,7 +323,7 @@ class _Search:
         (unrest, way), rests = last[-1], [one for one, _ in last]
         if way > self.most:
             return len(last) > 1 and unrest >= FADES * rests[0]
-        is_far = way > max(FAR * self.forces.deepest, LEAST_FAR * self.smallest)
+        is_far = way > max(FAR * self.forces.deepest, 2e-4 * self.smallest)
         return len(last) > LOOKS_BACK and is_far and all(one < other for one, other in pairwise(rests))
 
 

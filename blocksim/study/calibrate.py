@@ -267,6 +267,10 @@ def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit
     best so far, and how many are to be made. Raises ScenarioError, InputMissingError without an experiment table,
     InvalidInputError, OutputExistsError, OutputError, UnavailableError without the extra `study`, and StoppedEarlyError
     on Ctrl-C.
+
+    >>> blocks, friction = "scenarios/three_blocks_nonsmooth.toml", {"friction.block_block": {"from": 0.2, "to": 0.4}}
+    >>> calibrate(blocks, friction, trials=4, members=1)
+    <Fit of three_blocks_nonsmooth: best of 4 trials, nothing inside all ranges>
     """
     plan = calibrate_plan.calibration_plan(document_of(scenario), options)
     options.on_start(schemes.kernels_of(plan.base))

@@ -120,6 +120,10 @@ def capacity(run: Result | Path | str) -> CapacityAnswer:
 
     A run is a result or what `run_folder.find_run` takes. Raises InvalidInputError for a run without actuators or
     without samples of them, and what reading it raises.
+
+    >>> pushed = run(load("scenarios/walls/pushed_granite_wall.toml", {"time.end": 0.2}), out="results/pushed")
+    >>> capacity(pushed)
+    <Capacity of pushed_granite_wall: jack push 2.331 kN>
     """
     result = run if isinstance(run, Result) else read_result(run_folder.find_run(run))
     if not result.scenario.actuators:

@@ -54,6 +54,9 @@ def compare(
 
     A run is what `compare_run` takes; `settings` are for sweeps and curves. Raises what `compare_run` and
     `compare_sweep` raise.
+
+    >>> compare(run("scenarios/three_blocks_nonsmooth.toml")).inside
+    False
     """
     if isinstance(run, manifest.SweepResult) or (isinstance(run, Path | str) and manifest.is_sweep(run)):
         return compare_sweep(run, experiment, settings)

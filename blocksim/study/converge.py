@@ -392,6 +392,10 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     The runs are kept in `out` (default: results/NAME/converge). With more than one of `jobs` (None: one a core), a
     script needs the guard `if __name__ == "__main__":`. `on_run` is called with each level and its row. Raises
     ScenarioError, InvalidInputError, StepError for the scenario as it is, and StoppedEarlyError on Ctrl-C.
+
+    >>> soft = load("scenarios/slide.toml", {"contact.stiffness_scale": 0.001})
+    >>> converge(soft, studies=["step"], levels=3, out="results/converge")
+    <Convergence of slide: time step: converged (tolerance 0.1 mm)>
     """
     tolerance_mm, levels, studies = options.tolerance_mm, options.levels, options.studies
     if not isinstance(scenario, Scenario):

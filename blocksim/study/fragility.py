@@ -431,6 +431,11 @@ def fragility(scenario: Source, options: FragilityOptions) -> FragilityAnswer:
     `on_row` is called with every row, and how many there are. Raises ScenarioError, InvalidInputError,
     OutputExistsError where the folder is not free, UnavailableError without scipy, StoppedEarlyError on
     Ctrl-C.
+
+    >>> scatter = {"contact.restitution.block_block": {"from": 0.1, "to": 0.3}}
+    >>> blocks, levels = "scenarios/three_blocks_nonsmooth.toml", {"friction.block_block": [0.2, 0.3]}
+    >>> [one.failures for one in fragility(blocks, levels, scatter, members=4, out="results/fragility").points]
+    [4, 4]
     """
     return run_fragility(read_fragility(document_of(scenario), options), options)
 

@@ -92,6 +92,11 @@ def limit(scenario: Source, options: limit_plan.LimitOptions) -> limit_answer.Li
     at rest, unless the scenario has `start.settle = false`. The executor does not change the answer. `on_run` is called
     with each value, verdict and row. Raises ScenarioError, InvalidInputError, OutputExistsError where the folder is not
     free, UnavailableError, StoppedEarlyError on Ctrl-C.
+
+    >>> blocks = "scenarios/three_blocks_nonsmooth.toml"
+    >>> found = limit(blocks, {"structures.0.overlap": {"from": "12 mm", "to": "28 mm"}}, out="results/limit")
+    >>> round(found.changes[0].low, 1)  # mm: two thirds of a side
+    21.3
     """
     return find_limit(limit_plan.read_limit(document_of(scenario), options), options)
 
@@ -101,6 +106,11 @@ def limit_curve(scenario: Source, options: limit_plan.CurveOptions) -> limit_ans
     """Find the limits of a key at each value of another one: `limit` with `over`, {"friction.block_block": [0.3, 0.5]}.
 
     Searches are kept in `out` (default: results/NAME/limits-HASH). Raises as `limit`.
+
+    >>> blocks, gravity = "scenarios/three_blocks_nonsmooth.toml", {"gravity": [1.62, 9.81]}
+    >>> overlap = {"structures.0.overlap": {"from": "12 mm", "to": "28 mm"}}
+    >>> len(limit_curve(blocks, overlap, gravity, tolerance=0.05, out="results/curve").points)
+    2
     """
     return find_curve(limit_plan.read_curve(document_of(scenario), options), options)
 

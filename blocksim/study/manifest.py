@@ -344,7 +344,13 @@ def is_sweep(place: Path | str) -> bool:
 
 
 def read_sweep(folder: Path | str) -> SweepResult:
-    """Return the sweep that a folder holds. Raises InputMissingError or InvalidInputError."""
+    """Return the sweep that a folder holds. Raises InputMissingError or InvalidInputError.
+
+    >>> blocks, friction = "scenarios/three_blocks_nonsmooth.toml", {"friction.block_block": [0.1, 0.3]}
+    >>> swept = sweep(blocks, friction, out="results/swept")
+    >>> len(open_sweep("results/swept").table)
+    2
+    """
     result = SweepResult(Path(folder), planned=planned_in(Path(folder)))
     _ = result.table
     return result

@@ -428,6 +428,10 @@ def animate(place: run_folder.Place, options: AnimateOptions) -> Path:
     """Write a run as an animation, GIF or MP4, and return its path (default: NAME.gif in the current folder).
 
     Raises as `plot` does, and UnavailableError where nothing can write MP4.
+
+    >>> kept = run(load("scenarios/slide.toml", {"contact.stiffness_scale": 0.001}), out="results/kept")
+    >>> animate(kept, "slide.gif", width=200, fps=5.0).name
+    'slide.gif'
     """
     return draw_film(run_folder.folder_of(place), options)[0]
 
@@ -463,6 +467,10 @@ def plot(place: run_folder.Place, options: PlotOptions) -> Path:
     (default: NAME.png in the current folder). Raises InvalidInputError for an unknown kind or format, too small a page
     and a result that was not kept, InputMissingError, OutputExistsError for a file of others unless `overwrite`,
     OutputError.
+
+    >>> kept = run(load("scenarios/slide.toml", {"contact.stiffness_scale": 0.001}), out="results/kept")
+    >>> plot(kept, "slide.svg", kind="final").name
+    'slide.svg'
     """
     if isinstance(place, answer.UnstoredResult):
         return answer.draw_result(place, options)

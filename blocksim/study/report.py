@@ -25,6 +25,10 @@ def report(
     """Write runs and sweeps into one self-contained HTML file with a player, and return its path.
 
     Raises as `plot` does, and InvalidInputError, after writing, for what is damaged in them.
+
+    >>> kept = run(load("scenarios/slide.toml", {"contact.stiffness_scale": 0.001}), out="results/kept")
+    >>> report(kept, out="slide.html").name
+    'slide.html'
     """
     path = Path(out)
     files.refuse_foreign(path, overwrite=overwrite)

@@ -40,7 +40,7 @@ class RunOptions:
 
 
 @takes(RunOptions)
-def run(scenario: Source | Model, options: RunOptions) -> Result:
+def run(scenario: Source, options: RunOptions) -> Result:
     """Simulate a scenario and return the result; with `out` it is kept in that folder as well.
 
     A folder that holds the finished run of exactly this scenario and code is read instead, unless `overwrite` is
@@ -51,6 +51,9 @@ def run(scenario: Source | Model, options: RunOptions) -> Result:
     not go with the blocks, for more threads than the system has, for a checkpoint of another scenario or version of the
     code and for results that have been changed or cut since, OutputExistsError, OutputError; ValueError for `resume`
     with `overwrite` or without `out`.
+
+    >>> run(load("scenarios/slide.toml", {"contact.stiffness_scale": 0.001})).final["x_mm"].round(1).tolist()
+    [33.5]
     """
     out, overwrite, resume, threads = options.out, options.overwrite, options.resume, options.threads
     precautions, on_progress = options.precautions, options.on_progress
@@ -89,5 +92,9 @@ def open_run(place: Path | str) -> Result:
     """Return a stored run: a run folder, `results/NAME` (its newest finished run) or a scenario file that has been run.
 
     Raises InputMissingError where there is none and InvalidInputError for a damaged one.
+
+    >>> kept = run(load("scenarios/slide.toml", {"contact.stiffness_scale": 0.001}), out="results/kept")
+    >>> open_run("results/kept").summary.steps == kept.summary.steps
+    True
     """
     return read_result(run_folder.find_run(place))

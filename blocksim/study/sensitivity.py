@@ -329,6 +329,11 @@ def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
     how many runs have ended and how many there are. Raises ScenarioError, TooManyFailuresError where more than half of
     the blocks are left out, UnavailableError without the extra `study`, InvalidInputError where nothing is varied, the
     method is unknown or samples are too few, and what reading the experiment table raises.
+
+    >>> blocks = load("scenarios/three_blocks_nonsmooth.toml", {"time.end": 0.1})
+    >>> ends = {"from": 0.2, "to": 0.4}
+    >>> sensitivity(blocks, {"friction.block_block": ends, "friction.block_ground": ends}, method="morris", samples=4)
+    <Sensitivity of three_blocks_nonsmooth: morris, 4 trajectories, 12 runs>
     """
     if options.method not in METHODS:
         raise InvalidInputError(f"unknown method {options.method!r}; choose one of {', '.join(METHODS)}")

@@ -157,6 +157,10 @@ def static_limit(scenario: Source, options: limit_plan.LimitOptions) -> StaticAn
 
     Raises ScenarioError; InvalidInputError for options of runs (`stands`, `stiffer`, executors), and where something
     else acts than loads that are the same from time zero on; OutputExistsError where the folder is not free.
+
+    >>> overlap = {"structures.0.overlap": {"from": "12 mm", "to": "28 mm"}}
+    >>> round(static_limit("scenarios/three_blocks_nonsmooth.toml", overlap, out="results/static").limits[0].value, 2)
+    21.33
     """
     return find_static(limit_plan.read_limit(document_of(scenario), options), options)
 

@@ -86,6 +86,11 @@ def sweep(scenario: Source, options: SweepOptions) -> manifest.SweepResult:
     UnavailableError for a scheduler that does not answer, StoppedEarlyError on Ctrl-C.
 
     A script that has processes started needs the guard `if __name__ == "__main__":`, as they import the script.
+
+    >>> blocks, friction = "scenarios/three_blocks_nonsmooth.toml", {"friction.block_block": [0.1, 0.3]}
+    >>> swept = sweep(blocks, friction, out="results/swept")
+    >>> swept.table["3.x_mm"].round().tolist()
+    [214.0, 132.0]
     """
     return run_sweep(options.document(scenario), options)
 

@@ -37,7 +37,6 @@ FEWEST_CHECKS = 50  # in that time at least
 HALFWAY = 0.5  # of the smallest side: what is driven into a rigid contact comes no farther between checks
 LONGEST_HOLD = 5.0  # ends of the run, as which a longer time that rest must last counts, and none
 LEAST_PAIRS = 16
-LEAST_CELLS = 16
 PAIRS_PER_BODY = 3
 GROWTH = 1.25  # of the room for pairs, each time that it does not suffice
 Floats = NDArray[np.float64]
@@ -296,7 +295,7 @@ def assemble_world(
         **empty_lists(capacity, slots, before),
         particles=parts.particles,
         corners=join_records([one.shapes.table for one in layouts]) if layouts[0].shapes.has_polygons else None,
-        starts=numbers((members, max(blocks, LEAST_CELLS) + 3), np.uint32),
+        starts=numbers((members, max(blocks, 16) + 3), np.uint32),
         order=numbers((members, blocks), np.uint32),
         large=numbers(large.shape, np.uint32),
         interactions=interactions.interaction_tables([layout.interactions for layout in layouts]),

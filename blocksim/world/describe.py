@@ -20,7 +20,6 @@ CROWD = 50  # bodies
 OUTLINES_COST = 1.5  # times as much, where blocks with outlines are on springs: 1.0 to 1.7 measured
 # with particles: a block, and each particle around it; in a crowd as many times that, as all its faces touch others
 SECONDS_WITH_PARTICLES = {"kernel": (1.5e-6, 10e-9, 5.0), "particles": (0.7e-6, 6e-9, 2.0)}
-SECONDS_IN_A_SUBSTEP = 400e-9  # a block, where contacts are rigid
 RIGID_RULES = ("friction", "restitution")  # what decides where contacts are rigid
 
 
@@ -180,7 +179,7 @@ def _seconds_per_step(layout: Layout, particles: int) -> float:
     scenario, blocks = layout.scenario, len(layout.placed)
     is_crowd = blocks > CROWD
     if scenario.time.has_rigid_contacts:
-        return blocks * SECONDS_IN_A_SUBSTEP * scenario.time.parts
+        return blocks * 400e-9 * scenario.time.parts  # a block, where contacts are rigid
     if scenario.contact.model in SECONDS_WITH_PARTICLES:
         block, particle, more = SECONDS_WITH_PARTICLES[scenario.contact.model]
         return (more if is_crowd else 1.0) * (blocks * block + particles * particle)

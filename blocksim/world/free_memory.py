@@ -4,10 +4,7 @@ import os
 from pathlib import Path
 
 UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB", "EB")
-THOUSAND = 1000
 MOST_SHOWN = 999.5  # rounds to four digits
-KIBI = 1024
-MOST_CHUNK_ROWS = 64  # frames in a chunk of run.h5
 CHUNK_VALUES = 1 << 17  # a megabyte
 # Of control groups of version 1 and 2, by their controllers: where they are mounted, their limit and usage, and the
 # entry of memory.stat for cached files that are given up when memory runs short.
@@ -21,13 +18,13 @@ def readable(count: int) -> str:
     """Return bytes in the largest unit of which there is at least one, such as "3.1 GB"."""
     value, unit = float(count), 0
     while value >= MOST_SHOWN and unit + 1 < len(UNITS):
-        value, unit = value / THOUSAND, unit + 1
+        value, unit = value / 1000, unit + 1
     return f"{value:.3g} {UNITS[unit]}"
 
 
 def chunk_rows(elements: int) -> int:
     """Return how many frames of so many elements, the most of any system, run.h5 takes room for at a time."""
-    return min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // max(elements, 1)))
+    return min(64, max(1, CHUNK_VALUES // max(elements, 1)))  # frames in a chunk of run.h5
 
 
 def available_bytes(root: Path = Path("/")) -> int | None:
@@ -39,7 +36,7 @@ def available_bytes(root: Path = Path("/")) -> int | None:
     limits = []
     for name, value, *_ in (line.split() for line in _lines(root / "proc/meminfo")):
         if name == "MemAvailable:":
-            limits.append(int(value) * KIBI)
+            limits.append(int(value) * 1024)
     if not limits and "SC_AVPHYS_PAGES" in getattr(os, "sysconf_names", {}):
         limits.append(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     for line in _lines(root / "proc/self/cgroup"):  # hierarchy:controllers:path

@@ -21,14 +21,12 @@ from blocksim.scenario import GROUND, PlacedBody, Scenario, laws, resolution, re
 # e = 0 would need infinite damping; this rebound counts as none (the promise is at most 1 % of the impact speed)
 SMALLEST_RESTITUTION = 0.009
 BISECTIONS = 200  # at most; neighbouring numbers are reached after some sixty
-MOST_KNOWN = 10_000  # ratios that are kept: a sweep may have a restitution of its own in every case
-NEARLY_CRITICAL = 1e-9
 
 
 def restitution_of(damping_ratio: float) -> float:
     """Return the coefficient of restitution (-) of a clipped linear spring-dashpot contact, `damping_ratio` >= 0."""
     zeta = damping_ratio
-    if abs(zeta - 1.0) < NEARLY_CRITICAL:
+    if abs(zeta - 1.0) < 1e-9:
         return math.exp(-2.0)  # common limit of both branches
     root = math.sqrt(abs(1.0 - zeta * zeta))
     if zeta < 1.0:
@@ -36,7 +34,7 @@ def restitution_of(damping_ratio: float) -> float:
     return math.exp(-zeta / root * math.log((zeta + root) / (zeta - root)))
 
 
-@functools.lru_cache(MOST_KNOWN)
+@functools.lru_cache(10_000)  # ratios that are kept: a sweep may have a restitution of its own in every case
 def damping_ratio(restitution: float, law: str = laws.LINEAR.name) -> float:
     """Return the damping ratio (-) for a coefficient of restitution in [0, 1]; the inverse of `restitution_of`.
 

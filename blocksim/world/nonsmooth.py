@@ -13,7 +13,6 @@ from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.world import build, memory, rigid_step, sag, step
 from blocksim.world.bodies import Layout
 
-MOST_REACH = 1.5  # of a body, in skins
 ROOM = 2  # of the room for pairs of springs: fast bodies have more within reach
 FINEST, FINE, COARSE = 1e-6, 1e-3, 0.1  # m/s: tolerances of the velocity pass; see velocity_tolerance
 CROWD = 100  # blocks
@@ -103,7 +102,7 @@ def _stepping(layout: Layout, stride: step.Stride) -> dict[str, float]:
         "velocity_sweeps": time.velocity_sweeps,
         "is_guarded": has_sequential_impacts(layout.scenario),
         "least_reach": 0.5 * stride.skin,
-        "most_reach": MOST_REACH * stride.skin,
+        "most_reach": 1.5 * stride.skin,  # of a body, in skins
         "is_driven": layout.drives.driven.size > 0,
     }
 

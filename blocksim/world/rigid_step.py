@@ -43,7 +43,6 @@ from blocksim.world.step import Bounds, Speeds, StepError, Stride, choose_skin, 
 USUAL_STEP = 1e-3  # s
 SHARE = 0.1  # of the smallest side
 FEW = 13  # free blocks: fewer take shorter steps
-NATURAL = 0.02  # of sqrt(L/g): the step of so many
 CROWD = 100  # free blocks, from which on sagging does not shorten a step
 CALM = 0.9  # of the overlap or sag that is warned of
 SHIFT = 2e-5  # of the width of a joint, calibrated: limits are too low by some 0.02 %
@@ -54,7 +53,6 @@ HOLD = 100.0  # stiffness along a joint over that across it: rigid, and as accur
 PASSES = 20
 ROUND_OFF = 1e-9  # of the greatest pressure: tension that is none
 WORST = 0.5  # of the greatest tension: points with more open in the same pass
-SLACK = 1e-12  # of its stiffness: what holds a block that joints do not
 LOOSE = 1e6  # over the overlap of one point that carries everything: only mechanisms move farther
 FALLS = 50.0  # over displacements with all points closed: only mechanisms move farther
 FEW_UPRIGHT = 3  # rectangles along the axes, of which a stack cannot lean far
@@ -125,7 +123,7 @@ def _at_rest(frame: _Frame, forces: Floats) -> tuple[Floats, Floats, Floats] | N
     """
     closed = np.ones(frame.stiffness.size, bool)
     matrix = _stiffness(frame, closed)
-    matrix[np.diag_indices_from(matrix)] *= 1.0 + SLACK
+    matrix[np.diag_indices_from(matrix)] *= 1.0 + 1e-12  # of its stiffness: what holds a block that joints do not
     first = moved = _moved(matrix, forces)
     if not np.abs(first).max() < LOOSE * float(np.abs(forces[:, :2]).sum() / frame.stiffness.min()):
         return None
@@ -259,7 +257,7 @@ def reason_of_step(layout: Layout, bounds: Bounds, speeds: Speeds) -> Reason:
         why = "the stiffest actuator swings with its body alone at {:.3g} Hz"
         reasons.append(Reason(excitation.STIFF * scenario.time.parts / frequency, why, (frequency / (2.0 * math.pi),)))
     if bounds.free and scenario.gravity > 0.0:
-        share = NATURAL * bounds.free / FEW
+        share = 0.02 * bounds.free / FEW  # of sqrt(L/g): the step of so many
         why = "{:.2g} √(L/g) for so few blocks, L = {:.4g} mm the smallest side"
         parts = max(1, round(USUAL_STEP / (share * math.sqrt(bounds.smallest / scenario.gravity))))
         reasons.append(Reason(USUAL_STEP / parts, why, (share, MILLI * bounds.smallest)))

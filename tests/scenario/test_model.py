@@ -1,6 +1,5 @@
 """Models: varied ones are what loading gives, share what has not changed, and say the same about mistakes."""
 
-import doctest
 import pickle
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -97,11 +96,6 @@ def test_answers_and_checks_look_at_no_other_tables_than_they_declare(path: Path
         looked_at.clear()
         assert not [*check.find(recorded, lambda placed=placed: placed)]  # type: ignore[misc]
         assert looked_at <= placement.GEOMETRY.union(check.tables), check
-
-
-def test_example_of_a_model_prints_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(SCENARIOS.parent)
-    assert doctest.testmod(models) == (0, 5)
 
 
 def test_variation_shares_what_does_not_change_and_processes_get_the_scenario_alone() -> None:

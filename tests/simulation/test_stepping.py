@@ -1,6 +1,5 @@
 """A scene stepped from Python goes as a run does, from a moment on too, and says where it cannot."""
 
-import doctest
 from pathlib import Path
 from typing import Any
 
@@ -112,8 +111,3 @@ def test_contacts_carry_the_weight_of_a_block_that_slides() -> None:
     weight = 9.81 * 0.1089
     assert contacts.normal_force.sum() == pytest.approx(weight, rel=0.02)
     assert set(contacts.body_a) | set(contacts.body_b) == {"block", ""}
-
-
-def test_example_of_a_simulation_prints_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
-    assert doctest.testmod(loop) == (0, 4)

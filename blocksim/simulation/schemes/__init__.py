@@ -247,9 +247,6 @@ def system_totals(scene: AnyScene | systems.Coupled) -> tuple[Floats, float]:
     return np.delete(row, masses), sum(row[masses].tolist(), 0.0)
 
 
-START_SECONDS = 60.0
-
-
 def useful_threads(threads: int, bodies: int, least_bodies: int = BODIES_A_THREAD) -> int:
     """Return how many of `threads` are of use for a scene; the result is the same for any number, bit for bit.
 
@@ -281,7 +278,7 @@ class Team:
     def __enter__(self) -> Self:
         """Start the other threads. Raises InvalidInputError where the system does not give that many."""
         if self._pool is not None:
-            everybody = threading.Barrier(self.threads, timeout=START_SECONDS)
+            everybody = threading.Barrier(self.threads, timeout=60.0)
             try:
                 for _ in range(self.threads - 1):
                     self._pool.submit(everybody.wait)

@@ -75,7 +75,6 @@ def _write(path: Path, heads: Sequence[str], times: Floats, tables: Iterable[Ite
 UNFIT_FOR_LAYERS = re.compile(r"[<>/\\\":;?*|=']")
 CONTROLS = re.compile(r"[\x00-\x1f\x7f]")  # would end a line of the file
 MOST_LETTERS = 60  # of a name, 4 bytes each at most: extended data have 255
-METRES = 6  # DXF's number of the unit
 
 
 def write_geojson(path: Path, frames: Frames, model: Model) -> int:
@@ -109,7 +108,7 @@ def write_dxf(path: Path, frames: Frames, model: Model) -> int:
     """
     ezdxf = load_module("ezdxf", f"writing {path.name}", DXF)
     blocks = [*_last_blocks(frames, model)]
-    document = ezdxf.new("R2010", units=METRES)
+    document = ezdxf.new("R2010", units=6)  # DXF's number of the unit
     document.header.custom_vars.append(*files.DXF_PROPERTY)
     document.appids.new(DXF_APPLICATION)
     space = document.modelspace()

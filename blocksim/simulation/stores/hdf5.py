@@ -116,7 +116,6 @@ DAMAGE = (AttributeError, KeyError, MemoryError, OSError, OverflowError, Runtime
 SUPERBLOCK = struct.Struct("<8s4B3QQI")  # signature; version, sizes, flags; base, extension, end; root; checksum
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 VERSION = 3
-SIZE_OF_ADDRESS = 8
 WRITING, SWMR = 1, 4  # flags: HDF5 file format specification, II.A
 WORD = 0xFFFFFFFF
 MOST_MEMBERS = 64  # of a group; the schemes have a dozen energies
@@ -164,7 +163,7 @@ def open_hdf5(path: Path) -> Iterator[Any]:
         signature, version, offsets, lengths, flags, base, extension, end, root, checksum = SUPERBLOCK.unpack(head)
         if size < end:
             raise InvalidInputError(f"{path}: not a complete run file: cut off at {size} of {end} bytes")
-        if checksum != lookup3(head[:-4]) or offsets != SIZE_OF_ADDRESS:
+        if checksum != lookup3(head[:-4]) or offsets != 8:
             raise InvalidInputError(f"{path}: not a readable HDF5 file: its superblock is damaged")
         flags &= ~(WRITING | SWMR)
         closed = SUPERBLOCK.pack(signature, version, offsets, lengths, flags, base, extension, size, root, 0)[:-4]
@@ -381,7 +380,6 @@ def _contacts(path: Path, file: Any, frames: int, bodies: int) -> trajectory.Con
     return trajectory.Contacts(ends, rows)
 
 
-FLUSH_SECONDS = 0.25
 APART = 10.0  # times what the last flush took: a tenth of a run at most
 RESERVE = 1 << 18  # bytes
 
@@ -474,7 +472,7 @@ class FrameFile(AbstractContextManager["FrameFile"]):
 
     def keep_up(self) -> None:
         """Write what has come together, a few times a second; less often where that takes long. Raises OutputError."""
-        if time.monotonic() - self.flushed_at > max(FLUSH_SECONDS, APART * self.flush_seconds):
+        if time.monotonic() - self.flushed_at > max(0.25, APART * self.flush_seconds):
             self.commit()
 
     def commit(self) -> None:

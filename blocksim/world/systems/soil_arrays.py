@@ -20,8 +20,6 @@ ACTS = {"soils": step.flow, "blocks": contact.touch_blocks, "supports": contact.
 # thin front of a collapse 0.03 is several times the friction of its weight. It is there to damp waves: with 0.003 a
 # collapse loses 2 to 4 % of its energy to it, pressures at rest and thrusts stay as they are. A numerical choice.
 VISCOSITY = 0.003
-SKIN = 0.4  # of lists, in spacings
-FEW_TOUCHES = 128
 
 
 def build_soils(model: Model) -> arrays.Soils:
@@ -36,14 +34,14 @@ def build_soils(model: Model) -> arrays.Soils:
     states["number"] = np.arange(n)
     states["kind"] = [kinds[name.rpartition(".")[0]] for name in elements.names]
     groups = math.ceil(n / arrays.GROUP)
-    room = n + FEW_TOUCHES
+    room = n + 128
     bodies = len(model.bodies) + len(model.segments) + 1
     spacing, controls = tables[0].spacing, zeros(1, arrays.CONTROLS)
     one = controls[0]
     one.area = spacing**2
     one.smoothing = soils.SMOOTHING * spacing
     one.reach = WENDLAND_SUPPORT * one.smoothing
-    one.skin = SKIN * spacing
+    one.skin = 0.4 * spacing  # of lists, in spacings
     one.radius = 0.5 * spacing
     one.viscosity = VISCOSITY
     one.ramp = RAMP_TIME if any(table.start == "ramp" for table in tables) else 0.0

@@ -37,11 +37,9 @@ SETTLING = 5e-3  # damping meanwhile, in (E / (rho h^2))^(1/2)
 # is damped, in wave speeds over smoothing length; later it would have made the soil flow.
 SHOCK_TIME, SHOCK_DAMPING = 60.0, 0.1
 SMOOTHING = 1.5  # smoothing length in spacings
-USUAL_DEPTH = 1.0  # m, out of the plane, where there are no blocks
 # calibrated with smooth upright walls drawn back from 10 to 20 rows of 21.9 degrees on a rough base by 1 and 3 % of the
 # height: a, b of the share a/rows + b of the active thrust that is missing
 LACK = {"raw": ((2.2, 0.0), (2.5, 0.07)), "corrected": ((0.9, -0.006), (1.36, 0.026))}
-COURANT = 0.4  # step in smoothing lengths that a wave passes
 LOSSES = ("plastic", "viscosity", "dashpot", "friction", "settling", "ramp")
 ENERGIES = ("kinetic", "potential", "elastic", "contact", *LOSSES)  # J, as kernels/soil/step.py measures them
 COST = system.Cost(seconds=200e-9, memory=395)  # measured, with raw gradients
@@ -86,7 +84,7 @@ def earth_pressure_at_rest(material: Material) -> float:
 
 def depth_of_scene(model: Model) -> float:
     """Return the extent (m) of all soil out of the plane: that of the deepest block."""
-    return max((body.depth for body in model.bodies), default=USUAL_DEPTH)
+    return max((body.depth for body in model.bodies), default=1.0)  # m, out of the plane, where there are no blocks
 
 
 def damping_at_start(scenario: Scenario, table: SoilTable) -> tuple[float, float]:
@@ -333,7 +331,7 @@ def _largest_step(model: Model) -> float:
     scenario, tables = model.scenario, model.soils
     usual = float(timeline.Explicit.model_fields["safety"].default)
     finer = min(1.0, float(getattr(scenario.time, "safety", usual)) / usual)  # a finer step is finer for all
-    courant = COURANT * finer
+    courant = 0.4 * finer  # step in smoothing lengths that a wave passes
     return min(courant * SMOOTHING * table.spacing / wave_speed(scenario.materials[table.material]) for table in tables)
 
 

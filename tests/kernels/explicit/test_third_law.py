@@ -38,9 +38,9 @@ def strike(shape, angle, restitution, on_block):
     block = {"y": height + reach + 1e-9, "angle": angle, "velocity": [0.0, -1.0], **SHAPES[shape]}
     scene = CaseScene([*below, block], gravity=0.0, restitution=restitution, contact=CONTACT).start()
     steady = 0
-    while scene.contacts or scene.bodies[-1].vy < 0.0:
+    while scene.contact_count or scene.bodies[-1].vy < 0.0:
         scene.to_step(scene.steps + 1)
-        if scene.contacts and scene.steps % 8 == 0:
+        if scene.contact_count and scene.steps % 8 == 0:
             steady += is_steady(scene.world)
     return float(scene.bodies[-1].vy), scene.residual(), steady
 
