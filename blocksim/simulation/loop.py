@@ -1,4 +1,4 @@
-"""The one time loop, events on the way, and how it can end.
+"""A scene under way: `Simulation` for all who step one, the loop of a run, events on the way, how it can end.
 
 Compiled code runs until a frame, an energy check, an event or a checkpoint is due. Events fall on fixed steps, so that
 no output, checkpoint or number of threads decides about them. What happens is written into the arrays; then the pair

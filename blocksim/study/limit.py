@@ -252,7 +252,7 @@ class StandingSide:
             return max(self.give.share, 2.0 * math.radians(self.give.turn) / slender)
         # the softest contact gives way under the weight of all free blocks
         weight = scenario.gravity * sum(body.mass for body in placed if not body.fixed)
-        table = interactions_of(scenario, contact_classes(scenario, placed))
+        table = interactions_of(scenario, contact_classes(self.model))
         springs = (pair for row in table for pair in row if pair.normal_stiffness > 0.0)
         stiffness = min(pair.normal_stiffness * min(1.0, pair.shear_ratio) for pair in springs)  # in shear if softer
         sink = laws.LAWS[scenario.contact.law].compression(stiffness, weight)

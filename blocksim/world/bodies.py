@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from blocksim.kernels.common import arrays, tolerances
 from blocksim.kernels.explicit.models.particles import PER_PARTICLE
-from blocksim.scenario import Model, PlacedBody, PlacedSegment, Scenario, placement
+from blocksim.scenario import Model, PlacedBody, PlacedSegment, Scenario, derived, placement
+from blocksim.scenario.placement import GEOMETRY
 from blocksim.world.excitation import Drives, LoadArrays, drive_records, load_arrays
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
 
@@ -243,25 +244,28 @@ class Layout(NamedTuple):
 
 def layout_of(model: Model) -> Layout:
     """Return the layout of a scenario."""
-    scenario, placed, segments = model.scenario, model.bodies, model.segments
-    classes = contact_classes(scenario, placed)
-    slabs = _slab_records(scenario, placed, segments, classes)
-    shapes = shapes_of(placed, zip(slabs["half_x"].tolist(), slabs["half_y"].tolist(), strict=True))
-    prescribed = drive_records(model), load_arrays(model)
-    return Layout(
-        model, scenario, placed, segments, classes, interactions_of(scenario, classes), *prescribed, slabs, shapes
-    )
+    classes, slabs = contact_classes(model), slab_records(model)
+    table = interactions_of(model.scenario, classes)
+    kept = model, model.scenario, model.bodies, model.segments, classes, table
+    return Layout(*kept, drive_records(model), load_arrays(model), slabs, placed_shapes(model))
 
 
-def _slab_records(
-    scenario: Scenario, placed: Sequence[PlacedBody], segments: Sequence[PlacedSegment], classes: Sequence[ContactClass]
-) -> arrays.Records:
+@derived(*GEOMETRY, "contact")
+def placed_shapes(model: Model) -> Shapes:
+    """Return the shapes of all bodies."""
+    slabs = slab_records(model)
+    return shapes_of(model.bodies, zip(slabs["half_x"].tolist(), slabs["half_y"].tolist(), strict=True))
+
+
+@derived(*GEOMETRY, "contact")
+def slab_records(model: Model) -> arrays.Records:
     """Return every piece of ground as a slab below its line, longer where it must leave no crack."""
+    segments, classes = model.segments, contact_classes(model)
     slabs = arrays.zeros(len(segments), arrays.BODY)
     if not segments:
         return slabs
-    smallest = placement.reference_length(placement.smallest_width(placed))
-    thickness = max(SLAB_SHARE * smallest, 2.0 * (scenario.contact.max_overlap or 0.0))
+    smallest = placement.reference_length(placement.smallest_width(model.bodies))
+    thickness = max(SLAB_SHARE * smallest, 2.0 * (model.scenario.contact.max_overlap or 0.0))
     for record, segment in zip(slabs, segments, strict=True):
         along = ((segment.x1 - segment.x0) / segment.length, (segment.y1 - segment.y0) / segment.length)
         begin = -thickness if segment.extends_start else 0.0

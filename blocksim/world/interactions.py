@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.kernels.common.arrays import INTERACTION, Records, zeros
-from blocksim.scenario import GROUND, PlacedBody, Scenario, laws, resolution, resolve_pair
+from blocksim.scenario import GROUND, Model, Scenario, derived, laws, resolution, resolve_pair
+from blocksim.scenario.placement import GEOMETRY
 
 # e = 0 would need infinite damping; this rebound counts as none (the promise is at most 1 % of the impact speed)
 SMALLEST_RESTITUTION = 0.009
@@ -85,10 +86,12 @@ Interactions = tuple[tuple[Interaction, ...], ...]
 NOTHING = Interaction(*[0.0] * len(Interaction._fields))  # ground and walls do not touch one another
 
 
-def contact_classes(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> tuple[ContactClass, ...]:
+@derived(*GEOMETRY)
+def contact_classes(model: Model) -> tuple[ContactClass, ...]:
     """Return the classes in use: the ground, blocks in order of appearance, then walls of a material of their own."""
+    scenario = model.scenario
     ground = ContactClass(scenario.ground.material, math.inf)
-    blocks = dict.fromkeys((body.material, body.depth) for body in placed)
+    blocks = dict.fromkeys((body.material, body.depth) for body in model.bodies)
     walls = dict.fromkeys(wall.material for wall in scenario.walls if wall.material)
     return (
         ground,

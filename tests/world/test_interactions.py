@@ -95,7 +95,7 @@ def test_parameters_of_all_pairs_are_those_that_were_read(golden: Golden) -> Non
 
 
 def classes(of: Scenario) -> tuple[ContactClass, ...]:
-    return contact_classes(of, Model(of).bodies)
+    return contact_classes(Model(of))
 
 
 def table_of(of: Scenario) -> Records:

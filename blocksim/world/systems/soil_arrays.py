@@ -89,7 +89,7 @@ def kind_records(model: Model) -> Any:
 def interactions_with(model: Model) -> Any:
     """Return the parameters (soils, classes) of contacts with each class of bodies; see `world.interactions`."""
     scenario, tables = model.scenario, model.soils
-    classes = interactions.contact_classes(scenario, model.bodies)
+    classes = interactions.contact_classes(model)
     records = zeros((len(tables), len(classes)), INTERACTION)
     depth = soils.depth_of_scene(model)
     for row, table in zip(records, tables, strict=True):

@@ -75,7 +75,7 @@ def test_a_ramp_starts_without_stress() -> None:
 def test_friction_is_of_the_pair_else_of_the_soil_itself() -> None:
     faces = [right(0.05), {"from": [0.5, 0.0], "to": [0.5, 0.1], "material": "soft"}]
     scenario = scene(COLUMN, walls=faces, pairs=SMOOTH_WALLS, friction={"block_ground": 0.1})
-    classes = contact_classes(scenario, Model(scenario).bodies)
+    classes = contact_classes(Model(scenario))
     assert friction_with(scenario, "rods", GROUND, ground=True) == PairFriction(static=math.tan(ANGLE))
     found = {
         one.material: friction_with(scenario, "rods", str(one.material), ground=True).static
