@@ -8,7 +8,7 @@ of the rooms above take a model, or the part of it that they need; what takes lo
 from collections.abc import Callable, Collection, Mapping
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar, cast
 
 import pydantic
 
@@ -33,6 +33,7 @@ class Derived(Generic[T]):
 
     def __init__(self, function: "Callable[[Model], T]", tables: Collection[str]) -> None:
         """Take what makes the answer, and the tables of the scenario that it follows from alone."""
+        self.__doc__ = function.__doc__
         self.function, self.tables = function, frozenset(tables)
         ANSWERS.append(self)
 
@@ -45,9 +46,9 @@ class Derived(Generic[T]):
         answer: T = model.kept[self]
         return answer
 
-    def __get__(self, model: "Model", _: type) -> T:
-        """Return the answer where it is an attribute of the model."""
-        return self(model)
+    def __get__(self, model: "Model | None", _: type) -> T:
+        """Return the answer where it is an attribute of a model."""
+        return cast("T", self) if model is None else self(model)
 
 
 def derived(*tables: str) -> "Callable[[Callable[[Model], T]], Derived[T]]":
@@ -68,6 +69,17 @@ class Model:
     ----------
     source :
         What `blocksim.load` takes: a file, nested dictionaries in the form of a file, or a scenario.
+
+    Attributes
+    ----------
+    scenario : what was declared; `document` is its text, in which mistakes are shown
+    bodies : all blocks as they are placed, those of structures first; `placement` has where each comes from
+    segments : straight pieces of ground and walls; none of level ground without a profile
+    soils, probes : the tables of soil, and all probes by name, one of every actuator among them
+    acting_loads : loads in the order of the file, those on sides of structures once a face
+    motion, drives : displacement of the supports over time, and motions of driven bodies
+    implausible_values : a warning for each value that is hardly meant
+    hash : SHA-256 (hex) of all that determines motion and output, whatever the order of the file
 
     Raises
     ------
@@ -122,31 +134,20 @@ class Model:
         self.__init__(scenario)  # type: ignore[misc]
 
     document = derived(*Scenario.model_fields)(lambda model: document_of(model.scenario))
-    """The text of the scenario, in which mistakes are shown."""
     placement = derived(*GEOMETRY)(lambda model: places.place(model.scenario))
-    """All blocks, and the structure or single body that each comes from."""
     bodies = derived(*GEOMETRY)(lambda model: model.placement.bodies)
-    """All blocks as they are placed: those of structures first, in the order of the file."""
     segments = derived("ground", "walls")(lambda model: places.place_segments(model.scenario))
-    """Straight pieces of ground and walls; none of level ground without a profile."""
     soils = derived("systems")(lambda model: places.soil_tables(model.scenario))
-    """The soils of the scenario."""
     acting_loads = derived(*GEOMETRY, "loads")(lambda model: (*acting_loads(model.scenario, model.placement),))
-    """Loads in the order of the file, those on sides of structures once a face."""
     motion = derived("motion", "time")(lambda model: motions.motion_pieces(model.scenario))
-    """Displacement of the supports over time."""
     drives = derived("bodies", "structures", "time", "motion")(lambda model: motions.drives_of(model.scenario))
-    """Motions of driven bodies, in the order of the bodies."""
     probes = derived("probes", "actuators")(lambda model: events.probes_of(model.scenario))
-    """All probes by name: those of the file, and one of every actuator."""
     implausible_values = derived(*Scenario.model_fields)(
         lambda model: check.implausible_values(model.scenario, model.bodies)
     )
-    """A warning for each value that is hardly meant."""
     hash = derived(*Scenario.model_fields)(
         lambda model: resolution.hash_of_texts(texts(model) for texts in HASHED_TEXTS)
     )
-    """SHA-256 (hex) of all that determines motion and output, whatever the order of the file."""
 
     def varied(self, settings: Mapping[str, object]) -> "Model":
         """Return a model with other values; what follows from other tables of the scenario is shared with this one.

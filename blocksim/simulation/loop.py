@@ -495,7 +495,8 @@ class Simulation:
     @property
     def status(self) -> str:
         """`at rest`, where all blocks have been for as long as the scenario asks, or `under way`."""
-        return "at rest" if self.code == arrays.AT_REST else "under way"
+        needed, checks = self.scene.world.controls[0].rest_checks, self.scene.world.clock[0].checks_at_rest
+        return "at rest" if 0 < needed <= checks else "under way"
 
     @property
     def bodies(self) -> Any:

@@ -42,6 +42,7 @@ def test_steps_of_any_number_end_where_a_run_does_to_the_same_bits(name: str) ->
         assert one.bodies[quantity].tolist() == getattr(run.frames, quantity)[-1].tolist()
     assert one.status == ("at rest" if run.summary.reason == "at rest" else "under way")
     assert one.energy() == run.summary.energy_J
+    assert one.status == one.advance(steps=100).status
 
 
 def test_events_happen_at_their_steps_and_again_after_a_moment_before_them() -> None:
