@@ -125,13 +125,9 @@ class Model:
         """Return a line with what the scenario contains."""
         return f"<Model{repr(self.scenario).removeprefix('<Scenario')}"
 
-    def __getstate__(self) -> object:
+    def __reduce__(self) -> tuple[type[Self], tuple[Scenario]]:
         """Leave to others, such as processes, what follows from the scenario."""
-        return self.scenario
-
-    def __setstate__(self, scenario: Scenario) -> None:
-        """Take a scenario that has been checked."""
-        self.__init__(scenario)  # type: ignore[misc]
+        return type(self), (self.scenario,)
 
     document = derived(*Scenario.model_fields)(lambda model: document_of(model.scenario))
     placement = derived(*GEOMETRY)(lambda model: places.place(model.scenario))

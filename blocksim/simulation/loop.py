@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from operator import index
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -390,15 +391,17 @@ def steps_of_call(before: int, steps: int, seconds: float) -> int:
     return max(1, int(min(fitting, MOST_GROWTH * max(steps, before)))) if steps > 0 else before
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class KeptMoment:
     """A moment of a simulation, as `Simulation.copy` keeps and `restore` takes it.
 
     `bodies` has x, y (m), angle (rad), vx, vy (m/s) and spin (rad/s) of all blocks in order of placement. What is
-    written there is what the scene has after `restore`; the energy that it brings is booked under `events`.
+    written there is what the scene has after `restore`; the energy of the change is booked in the ledger under
+    `events`, negative where it is brought in.
     """
 
     bodies: Any  # (n,) record array
+    scenario: str  # its hash
     scene: schemes.AnyScene
     samples: tuple[tuple[int, tuple[Any, ...]], ...]  # of each probe: step of the last one, and all
     events: tuple[results.EventRecord, ...]
@@ -417,6 +420,12 @@ class Simulation:
         A `Model`, or what `blocksim.load` takes.
     threads :
         Threads, of use for scenes of 200 blocks and more. Results do not depend on it.
+
+    Attributes
+    ----------
+    model, names : what is simulated, and the names of its blocks in order of placement
+    step : length of a step (s)
+    settled : how the scene came to rest before time zero, None where it did not have to
 
     Raises
     ------
@@ -482,6 +491,10 @@ class Simulation:
         self.scene, self.code = self.team.advance(self.scene, last_step)
         self.seconds += time.perf_counter()
 
+    def __repr__(self) -> str:
+        """Return a line with the name, the time and the status."""
+        return f"<Simulation {self.model.scenario.name}: {self.time:.6g} s, {len(self.names)} blocks, {self.status}>"
+
     @property
     def steps(self) -> int:
         """Steps since the start."""
@@ -494,7 +507,7 @@ class Simulation:
 
     @property
     def status(self) -> str:
-        """`at rest`, where all blocks have been for as long as the scenario asks, or `under way`."""
+        """`at rest` once all blocks were for as long as the scenario asks, else, or if it does not, `under way`."""
         needed, checks = self.scene.world.controls[0].rest_checks, self.scene.world.clock[0].checks_at_rest
         return "at rest" if 0 < needed <= checks else "under way"
 
@@ -502,7 +515,8 @@ class Simulation:
     def bodies(self) -> Any:
         """The blocks at present: x, y (m), angle (rad), vx, vy (m/s), spin (rad/s), a read-only record array.
 
-        They are in order of placement, as `names` has them. It is a view; `copy` keeps a moment.
+        They are in order of placement, as `names` has them; one that was removed stays where it was. The values change
+        with the next step, and arrays from before `restore` show the scene of then: `bodies.x.copy()` keeps numbers.
         """
         view = self.scene.world.bodies[: len(self.placed)][list(instruments.MOTION)].view(np.recarray)
         view.flags.writeable = False
@@ -521,7 +535,7 @@ class Simulation:
     def advance(self, *, to: float | None = None, steps: int | None = None) -> Self:
         """Advance to the step nearest to a time, or by a number of steps; return the simulation.
 
-        A scene at rest goes on as well, and says so by `status`.
+        A scene at rest goes on as well, and says so by `status`; time.end of the scenario does not end it.
 
         Parameters
         ----------
@@ -539,9 +553,11 @@ class Simulation:
         """
         if (to is None) == (steps is None):
             raise ValueError("give either a time (to) or a number of steps")
-        last = self.steps + int(steps) if steps is not None else round(float(to or 0.0) / self.step)
+        if to is not None and not math.isfinite(to):
+            raise ValueError(f"a finite time (s) is needed, not {to}")
+        last = self.steps + index(steps) if steps is not None else round((to or 0.0) / self.step)
         if last < self.steps:
-            raise ValueError(f"step {last} is before the present one, {self.steps}: restore a copy")
+            raise ValueError(f"{last * self.step:.6g} s is before the present, {self.time:.6g} s: restore a moment")
         with schemes.Team(self.team.threads) as self.team:
             while (done := self.steps) < last:
                 due = min(self.probe_channels.next_step(done), balance.next_energy_check(done, len(self.placed)))
@@ -565,9 +581,9 @@ class Simulation:
             raise SteppingError(diagnose(outcome, self.code, self.scene, self.placed).reason)
 
     def contacts(self) -> "pd.DataFrame":
-        """Return the contacts: names of both bodies, place (m), normal, overlap (m), forces (N).
+        """Return the contact points of the last step: names of both bodies, place (m), normal, overlap (m), forces (N).
 
-        The normal points from body b to body a; the ground and walls have no name.
+        The normal points from body b to body a; the name of ground and walls is empty. There are none before a step.
         """
         import pandas as pd
 
@@ -583,11 +599,9 @@ class Simulation:
 
     def copy(self) -> KeptMoment:
         """Return the present moment, to be changed or restored; the simulation shares nothing with it."""
-        bodies, samples = (
-            np.array(self.bodies).view(np.recarray),
-            tuple((one.last, tuple(one.rows)) for one in self.probe_channels.all),
-        )
-        return KeptMoment(bodies, copy.deepcopy(self.scene), samples, self.events, self.code)
+        bodies = np.array(self.bodies).view(np.recarray)
+        samples = tuple((one.last, tuple(one.rows)) for one in self.probe_channels.all)
+        return KeptMoment(bodies, self.model.hash, copy.deepcopy(self.scene), samples, self.events, self.code)
 
     def restore(self, moment: KeptMoment) -> Self:
         """Go to a moment; return the simulation. From one that was not changed it goes on to the same bits.
@@ -595,19 +609,23 @@ class Simulation:
         Parameters
         ----------
         moment :
-            What `copy` returned; its `bodies` may have been changed.
+            What `copy` of a simulation of the same model returned; its `bodies` may have been changed.
 
         Raises
         ------
         InvalidInputError
-            For numbers that are not finite, and for changes of a block that is not free. Nothing is changed then.
+            For a moment of another scenario, numbers that are not finite, and changes of a block that is not free.
+            Nothing is changed then.
         """
+        if getattr(moment, "scenario", None) != self.model.hash:
+            how = "write its bodies into a moment of this one to go on from there with other values"
+            raise InvalidInputError(f"restore takes what copy() of a simulation of the same scenario returned; {how}")
         scene = copy.deepcopy(moment.scene)
         bodies = scene.world.bodies[: len(self.placed)]
         is_changed = np.any([moment.bodies[name] != bodies[name] for name in instruments.MOTION], axis=0)
         for number in np.flatnonzero(is_changed):
             if not bodies[number].inverse_mass > 0.0:
-                raise InvalidInputError(f"body {self.names[number]} is not free: what holds or drives it moves it")
+                raise InvalidInputError(f"body {self.names[number]} is not free: it is held, driven or removed")
             if not np.isfinite(moment.bodies[number].tolist()).all():
                 raise InvalidInputError(f"body {self.names[number]}: places and velocities have to be finite numbers")
         self.scene, self.code = scene, moment.code

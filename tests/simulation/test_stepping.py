@@ -80,6 +80,15 @@ def test_what_cannot_be_restored_is_refused_and_changes_nothing() -> None:
     for moment, words in ((moved, "body 1 is not free"), (lost, r"body 2: .* finite")):
         with pytest.raises(InvalidInputError, match=words):
             one.restore(moment)
+    other = Simulation(one.model.varied({"friction.block_block": 0.2}))
+    for stranger in (other.copy(), Simulation(scene("slide")).copy(), one):
+        with pytest.raises(InvalidInputError, match="same scenario"):
+            one.restore(stranger)  # type: ignore[arg-type]
+    for time in (np.nan, np.inf):
+        with pytest.raises(ValueError, match="finite"):
+            one.advance(to=time)
+    with pytest.raises(TypeError, match="integer"):
+        one.advance(steps=2.7)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="read-only"):
         one.bodies.x[1] = 0.0
     with pytest.raises(ValueError, match="before the present"):
