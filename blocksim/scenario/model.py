@@ -7,6 +7,7 @@ of the rooms above take a model, or the part of it that they need; what takes lo
 
 from collections.abc import Callable, Collection, Mapping
 from functools import cache, partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Generic, Self, TypeVar, cast
 
@@ -39,8 +40,8 @@ class Derived(Generic[T]):
 
     def __call__(self, model: "Model") -> T:
         """Return the answer for a model."""
-        if model.origin is not None and self.tables.isdisjoint(model.changed):
-            return self(model.origin)
+        while model.origin is not None and self.tables.isdisjoint(model.changed):
+            model = model.origin
         if self not in model.kept:
             model.kept[self] = self.function(model)
         answer: T = model.kept[self]
@@ -142,7 +143,9 @@ class Model:
         lambda model: check.implausible_values(model.scenario, model.bodies)
     )
     hash = derived(*Scenario.model_fields)(
-        lambda model: resolution.hash_of_texts(texts(model) for texts in HASHED_TEXTS)
+        lambda model: sha256(
+            f"{{{','.join(sorted(one for of in HASHED_TEXTS for one in of(model)))}}}".encode()
+        ).hexdigest()
     )
 
     def varied(self, settings: Mapping[str, object]) -> "Model":
@@ -151,7 +154,7 @@ class Model:
         Parameters
         ----------
         settings :
-            Values by dotted key, numbers in SI or strings with a unit, as in `blocksim.replace`.
+            Values by dotted key, numbers in SI or strings with a unit; tables lie where those of the file may.
 
         Raises
         ------
@@ -180,7 +183,8 @@ class Model:
             return None
         parts = {name: getattr(one, name) for name, one in read.items()}
         model = Model(self.scenario.model_copy(update=parts))
-        model.origin, model.changed = self, tables
+        is_changed_again = self.origin is not None and tables.issuperset(self.changed)
+        model.origin, model.changed = self.origin if is_changed_again else self, tables
         model.kept[vars(Model)["document"]] = changed
         with changed.file_access():
             mistakes = check.mistakes_among(

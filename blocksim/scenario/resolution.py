@@ -1,11 +1,9 @@
 """What a scenario resolves to: parameters of pairs of materials, all values written out, and their hash."""
 
 import functools
-import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -138,11 +136,6 @@ def hashed_texts(scenario: Scenario, field: str) -> list[str]:
     return [
         json.dumps({key: value}, sort_keys=True, separators=(",", ":"), allow_nan=False)[1:-1] for key, value in texts
     ]
-
-
-def hash_of_texts(texts: Iterable[Sequence[str]]) -> str:
-    """Return the SHA-256 (hex) of what all fields of a scenario add, whatever the order of the file."""
-    return hashlib.sha256(f"{{{','.join(sorted(chain.from_iterable(texts)))}}}".encode()).hexdigest()
 
 
 def _plain(table: object) -> Any:

@@ -107,3 +107,15 @@ def test_variation_shares_what_does_not_change_and_processes_get_the_scenario_al
     assert again.kept == {}
     assert (again.scenario, again.hash) == (other.scenario, other.hash)
     assert Model(other).bodies is base.bodies
+
+
+def test_a_loop_that_varies_the_last_model_keeps_no_chain_of_models() -> None:
+    base = Model(SCENARIOS / "three_blocks.toml")
+    last = base
+    for number in range(5):
+        last = last.varied({"friction.block_block": 0.1 * number})
+    assert last.origin is base
+    assert last.scenario.friction.block_block.kinetic == 0.4
+    lifted = last.varied({"gravity": "1.62 m/s^2"})
+    assert lifted.bodies is base.bodies
+    assert lifted.scenario.friction == last.scenario.friction
