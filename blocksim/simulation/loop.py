@@ -15,7 +15,6 @@ from operator import index
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.kernels.common import arrays, mechanics, tolerances
@@ -456,8 +455,8 @@ class Simulation:
         step, elements = float(scene.world.controls[0].step), sum(one.count for one in systems.others_of(model))
         with schemes.team_for(scene, threads, elements) as self.team:
             scene, self.settled = initial_scene(scene, model, self.team)
-        self.probe_channels = instruments.probes_of(model, step, schemes.ledger_names(scene))
-        self._take(scene, model.bodies, Timeline(model, step), self.team)
+            self._take(scene, model.bodies, Timeline(model, step), self.team)
+        self.probe_channels = instruments.probes_of(model, step, schemes.ledger_names(self.scene))
         self.probe_channels.sample(self.scene)
 
     def _take(
@@ -547,7 +546,7 @@ class Simulation:
         Raises
         ------
         SteppingError
-            Where a run would fail: with the reason, the block and the step.
+            Where a run would fail: with the reason, the block and the step. Energy is checked at the steps of a run.
         ValueError
             For none or both, or a time before the present.
         """
@@ -560,12 +559,13 @@ class Simulation:
             raise ValueError(f"{last * self.step:.6g} s is before the present, {self.time:.6g} s: restore a moment")
         with schemes.Team(self.team.threads) as self.team:
             while (done := self.steps) < last:
-                due = min(self.probe_channels.next_step(done), balance.next_energy_check(done, len(self.placed)))
+                look = balance.next_energy_check(done, self.scene.world.bodies.size - 1)
                 began = time.perf_counter()
-                self.step_to(min(last, due, done + self.pace))
+                self.step_to(min(last, look, self.probe_channels.next_step(done), done + self.pace))
                 self.pace = steps_of_call(self.pace, self.steps - done, time.perf_counter() - began)
-                self._refuse_failure()
                 self.probe_channels.sample(self.scene)
+                outcome = outcome_of(self.code, self.energy()) if self.steps == look else BY_CODE[self.code]
+                self._refuse_failure(outcome, self.code, self.scene)
         return self
 
     def step_to(self, last: int) -> None:
@@ -575,10 +575,9 @@ class Simulation:
         if self.timeline is not None and self.steps > done:
             self.scene, self.code = self.timeline.act(self.scene, self.team, self.code)
 
-    def _refuse_failure(self) -> None:
-        outcome = outcome_of(self.code, self.energy())
+    def _refuse_failure(self, outcome: Outcome, code: int, scene: schemes.AnyScene) -> None:
         if outcome.status == "failed":
-            raise SteppingError(diagnose(outcome, self.code, self.scene, self.placed).reason)
+            raise SteppingError(diagnose(outcome, code, scene, self.placed).reason)
 
     def contacts(self) -> "pd.DataFrame":
         """Return the contact points of the last step: names of both bodies, place (m), normal, overlap (m), forces (N).
@@ -614,42 +613,46 @@ class Simulation:
         Raises
         ------
         InvalidInputError
-            For a moment of another scenario, numbers that are not finite, and changes of a block that is not free.
-            Nothing is changed then.
+            For a moment of another scenario, numbers that are not finite, changes of a block that is not free, and
+            other places beside soil and further systems. Nothing is changed then.
+        SteppingError
+            Where blocks on springs are too deep in one another; rigid ones are pressed apart. Nothing is changed then.
         """
         if getattr(moment, "scenario", None) != self.model.hash:
             how = "write its bodies into a moment of this one to go on from there with other values"
             raise InvalidInputError(f"restore takes what copy() of a simulation of the same scenario returned; {how}")
-        scene = copy.deepcopy(moment.scene)
-        bodies = scene.world.bodies[: len(self.placed)]
-        is_changed = np.any([moment.bodies[name] != bodies[name] for name in instruments.MOTION], axis=0)
-        for number in np.flatnonzero(is_changed):
+        scene, code = copy.deepcopy(moment.scene), moment.code
+        bodies, before, old = (
+            scene.world.bodies[: len(self.placed)],
+            balance.start_energy(scene),
+            moment.scene.world.bodies,
+        )
+        is_changed = np.array([moment.bodies[name] != bodies[name] for name in instruments.MOTION])
+        for number in np.flatnonzero(is_changed.any(axis=0)):
             if not bodies[number].inverse_mass > 0.0:
                 raise InvalidInputError(f"body {self.names[number]} is not free: it is held, driven or removed")
             if not np.isfinite(moment.bodies[number].tolist()).all():
                 raise InvalidInputError(f"body {self.names[number]}: places and velocities have to be finite numbers")
-        self.scene, self.code = scene, moment.code
+            if getattr(scene, "systems", ()) and is_changed[:3, number].any():
+                how = "only velocities can be changed beside soil and further systems"
+                raise InvalidInputError(f"body {self.names[number]} is elsewhere: {how}")
+        if is_changed.any():
+            code = arrays.REACHED
+            for name in instruments.MOTION:
+                bodies[name] = moment.bodies[name]
+            mechanics.renew_rotations(scene.world.bodies)
+            scene.world.clock["rebuilds"] = scene.world.clock["checks_at_rest"] = 0
+            if schemes.scheme_of(scene).after_event(scene, old):
+                with schemes.Team(self.team.threads) as team:
+                    scene, code = team.advance(scene, int(scene.world.clock[0].steps))
+            scene.world.ledger[0].events += before - balance.start_energy(scene)
+            self._refuse_failure(BY_CODE[code], code, scene)
+        self.scene, self.code = scene, code
         if self.timeline is not None:
             self.timeline.records = moment.events
         for channel, (last, rows) in zip(self.probe_channels.all, moment.samples, strict=True):
             channel.last, channel.rows = last, [*rows]
-        if is_changed.any():
-            self._change(moment.bodies, is_changed)
         return self
-
-    def _change(self, values: Any, is_changed: NDArray[np.bool_]) -> None:
-        """Write blocks as they were changed, have contacts evaluated anew, and book the energy."""
-        world, before = self.scene.world, balance.start_energy(self.scene)
-        old = world.bodies.copy()
-        for name in instruments.MOTION:
-            world.bodies[: len(self.placed)][name][is_changed] = values[name][is_changed]
-        mechanics.renew_rotations(world.bodies)
-        world.clock["rebuilds"] = world.clock["checks_at_rest"] = 0
-        self.code = arrays.REACHED
-        if schemes.scheme_of(self.scene).after_event(self.scene, old):
-            self._call(self.steps)
-        self.scene.world.ledger[0].events += before - balance.start_energy(self.scene)
-        self._refuse_failure()
 
 
 class _Run(Simulation):

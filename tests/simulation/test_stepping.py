@@ -94,6 +94,84 @@ def test_what_cannot_be_restored_is_refused_and_changes_nothing() -> None:
     with pytest.raises(ValueError, match="before the present"):
         one.advance(to=0.0)
     assert state(one) == before
+    one = Simulation(scene("three_blocks")).advance(steps=10)
+    before, sunk = state(one), one.copy()
+    sunk.bodies.y[1] -= 0.01
+    with pytest.raises(loop.SteppingError, match="block 1 and block 2"):
+        one.restore(sunk)
+    assert state(one) == before
+    assert one.advance(steps=10).steps == 20
+
+
+STRUCK: dict[str, Any] = {  # by a heavy block without loss: impacts create energy meanwhile
+    "schema": 1,
+    "name": "struck",
+    "materials": {
+        name: {"density": density, "young_modulus": 1e9, "poisson_ratio": 0.3}
+        for name, density in (("light", 2000.0), ("heavy", 20000.0))
+    },
+    "blocks": {name: {"width": 0.1, "height": 0.1, "length": 0.1, "material": name} for name in ("light", "heavy")},
+    "bodies": [
+        *({"block": "light", "x": 0.0, "y": 0.05 + 0.1 * level} for level in range(5)),
+        {"block": "heavy", "x": 0.02, "y": 0.555, "velocity": [0.0, -1.0], "angle": "3 deg"},
+    ],
+    "time": {"scheme": "nonsmooth", "end": 0.5, "stop_at_rest": False},
+    "contact": {"restitution": {"block_block": 1.0, "block_ground": 1.0}},
+}
+
+
+def test_where_calls_end_does_not_decide_whether_a_scene_goes_on() -> None:
+    one, other = Simulation(STRUCK).advance(steps=9).advance(steps=1), Simulation(STRUCK).advance(steps=10)
+    assert one.energy().impacts < -0.05 * one.energy().in_play
+    assert state(one) == state(other)
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
+def test_threads_change_no_bit_of_steps_and_moments(scheme: str) -> None:
+    row = [{"block": "light", "x": 0.15 * number, "y": 0.06} for number in range(250)]
+    contact = {"stiffness_scale": 0.001} if scheme == "explicit" else {}
+    many = {**STRUCK, "bodies": row, "time": {"scheme": scheme, "end": 0.5}, "contact": contact}
+    alone, team = (Simulation(many, threads=threads) for threads in (1, 2))
+    for one in (alone, team):
+        moment = one.advance(steps=10).copy()
+        moment.bodies.y[7] += 0.01
+        one.restore(moment).advance(steps=10)
+    assert state(alone) == state(team)
+
+
+def test_contacts_of_a_rigid_block_that_was_put_elsewhere_press_no_more() -> None:
+    stack = {**STRUCK, "bodies": STRUCK["bodies"][:2]}
+    one = Simulation(stack).advance(steps=20)
+    moment = one.copy()
+    moment.bodies.x[1] += 1.0
+    moment.bodies.y[1] += 0.2
+    contacts = one.restore(moment).contacts()
+    assert contacts[(contacts.body_a == "2") | (contacts.body_b == "2")].normal_force.sum() == 0.0
+    assert one.advance(steps=20).energy().relative_residual < 1e-9
+
+
+def test_beside_soil_velocities_can_be_changed_and_places_cannot() -> None:
+    sand = {"density": 1800.0, "young_modulus": 1e6, "poisson_ratio": 0.3, "friction_angle": "30 deg"}
+    corners = [[-0.2, 0.0], [-0.05, 0.0], [-0.05, 0.15], [-0.2, 0.15]]
+    one = Simulation(
+        {
+            **STRUCK,
+            "materials": {**STRUCK["materials"], "sand": sand},
+            "bodies": STRUCK["bodies"][:1],
+            "walls": [{"from": [-0.2, 0.5], "to": [-0.2, 0.0]}],
+            "soils": [{"name": "backfill", "material": "sand", "outline": corners, "spacing": 0.0125}],
+            "time": {"end": 0.1},
+            "contact": {"stiffness_scale": 0.01},
+        }
+    ).advance(steps=10)
+    moved, pushed = one.copy(), one.copy()
+    moved.bodies.x[0] -= 0.002
+    with pytest.raises(InvalidInputError, match="beside soil"):
+        one.restore(moved)
+    pushed.bodies.vx[0] += 0.1
+    kinetic, events = one.energy().kinetic, one.energy().events
+    ledger = one.restore(pushed).energy()
+    assert events - ledger.events == pytest.approx(ledger.kinetic - kinetic)
 
 
 def test_probes_are_those_of_a_run_also_after_going_back() -> None:

@@ -67,7 +67,9 @@ def renew(scene: arrays.Nonsmooth, old: Records) -> bool:
     for name in RATES:
         before[name] = states[name]
     listed = scene.contacts.constraints[: int(scene.contacts.stepping[0].constraint_count)]
-    is_gone = (bodies["is_moved"][listed["a"]] == REMOVED) | (bodies["is_moved"][listed["b"]] == REMOVED)
+    is_gone = np.any([old[name] != bodies[name] for name in ("x", "y", "angle")], axis=0)
+    is_gone |= bodies["is_moved"] == REMOVED
+    is_gone = is_gone[listed["a"]] | is_gone[listed["b"]]
     for name in ("normal_one", "normal_two", "shear"):
         listed[name][is_gone] = 0.0
     listed["reach"][is_gone] = arrays.AWAY
