@@ -143,9 +143,7 @@ class Model:
         lambda model: check.implausible_values(model.scenario, model.bodies)
     )
     hash = derived(*Scenario.model_fields)(
-        lambda model: sha256(
-            f"{{{','.join(sorted(one for of in HASHED_TEXTS for one in of(model)))}}}".encode()
-        ).hexdigest()
+        lambda me: sha256(b"{%b}" % ",".join(sorted(t for of in HASHED_TEXTS for t in of(me))).encode()).hexdigest()
     )
 
     def varied(self, settings: Mapping[str, object]) -> "Model":

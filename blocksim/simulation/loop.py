@@ -43,6 +43,23 @@ class SteppingError(BlocksimError):
     exit_code = ExitCode.NUMERICAL_FAILURE
 
 
+def renewed(
+    scene: schemes.AnyScene, team: schemes.Team, bodies: arrays.Records, before: float
+) -> tuple[schemes.AnyScene, int, float]:
+    """Have the pair list of a changed scene made anew, and the contacts of this moment where the scheme asks.
+
+    Take the bodies and the energy (J) before; return the scene, its status code, and the energy booked under `events`.
+    """
+    code = arrays.REACHED
+    scene.world.clock[0].rebuilds = 0
+    if schemes.scheme_of(scene).after_event(scene, bodies):
+        scene, code = team.advance(scene, int(scene.world.clock[0].steps))
+    energy = before - balance.start_energy(scene)
+    scene.world.clock[0].checks_at_rest = 0
+    scene.world.ledger[0].events += energy
+    return scene, code, energy
+
+
 class Timeline:
     """The events of one run, and how far they have come."""
 
@@ -89,17 +106,10 @@ class Timeline:
         return scene, status
 
     def _happen(self, scene: schemes.AnyScene, team: schemes.Team, number: int) -> tuple[schemes.AnyScene, int]:
-        """Change the arrays and have the pair list made anew, and the contacts of this moment where the scheme asks."""
+        """Let an event happen and record it; return the scene and the status code."""
         before, event, bodies = balance.start_energy(scene), self.events[number], scene.world.bodies.copy()
-        scene, status = self._changed(scene, event), arrays.REACHED
-        clock = scene.world.clock[0]
-        clock.rebuilds = 0
-        if schemes.scheme_of(scene).after_event(scene, bodies):
-            scene, status = team.advance(scene, int(clock.steps))
-        clock, energy = scene.world.clock[0], before - balance.start_energy(scene)
-        clock.checks_at_rest = 0
-        scene.world.ledger[0].events += energy
-        steps = int(clock.steps)
+        scene, status, energy = renewed(self._changed(scene, event), team, bodies, before)
+        steps = int(scene.world.clock[0].steps)
         what, seconds = events.describe_event(event), steps * self.step
         record = results.EventRecord(event=number, step=steps, time_s=seconds, what=what, energy_J=energy)
         self.records = (*self.records, record)
@@ -622,11 +632,7 @@ class Simulation:
             how = "write its bodies into a moment of this one to go on from there with other values"
             raise InvalidInputError(f"restore takes what copy() of a simulation of the same scenario returned; {how}")
         scene, code = copy.deepcopy(moment.scene), moment.code
-        bodies, before, old = (
-            scene.world.bodies[: len(self.placed)],
-            balance.start_energy(scene),
-            moment.scene.world.bodies,
-        )
+        bodies = scene.world.bodies[: len(self.placed)]
         is_changed = np.array([moment.bodies[name] != bodies[name] for name in instruments.MOTION])
         for number in np.flatnonzero(is_changed.any(axis=0)):
             if not bodies[number].inverse_mass > 0.0:
@@ -637,15 +643,11 @@ class Simulation:
                 how = "only velocities can be changed beside soil and further systems"
                 raise InvalidInputError(f"body {self.names[number]} is elsewhere: {how}")
         if is_changed.any():
-            code = arrays.REACHED
             for name in instruments.MOTION:
                 bodies[name] = moment.bodies[name]
             mechanics.renew_rotations(scene.world.bodies)
-            scene.world.clock["rebuilds"] = scene.world.clock["checks_at_rest"] = 0
-            if schemes.scheme_of(scene).after_event(scene, old):
-                with schemes.Team(self.team.threads) as team:
-                    scene, code = team.advance(scene, int(scene.world.clock[0].steps))
-            scene.world.ledger[0].events += before - balance.start_energy(scene)
+            with schemes.Team(self.team.threads) as team:
+                scene, code, _ = renewed(scene, team, moment.scene.world.bodies, balance.start_energy(moment.scene))
             self._refuse_failure(BY_CODE[code], code, scene)
         self.scene, self.code = scene, code
         if self.timeline is not None:
