@@ -44,7 +44,9 @@ def column(width: float, height: float, spacing: float, **keys: Any) -> dict[str
 def data_of(*soils: dict[str, Any], end: float = 1.0, **changes: Any) -> dict[str, Any]:
     """Return the data of a scenario with these soils and a block far away."""
     time = {"end": end, "stop_at_rest": False}
+    start = {"settle": False}
     data = {"schema": 1, "name": "soil", "materials": MATERIALS, "blocks": BLOCKS, "bodies": [FAR], "time": time}
+    data["start"] = start
     return {**data, "soils": list(soils), **changes}
 
 

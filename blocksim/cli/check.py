@@ -225,7 +225,7 @@ def _acting(model: Model, step: float) -> Iterator[str]:
     springs = excitation.springs_of(model, step)
     jacks = zip(events.actuator_names(scenario), scenario.actuators, springs, strict=True)
     yield from _some("actuator", [f"{name}: {_actuator(one, spring)}" for name, one, (spring, _) in jacks])
-    if motion.settles(scenario):
+    if model.settles:
         held = f"; held: {', '.join(scenario.start.hold)}" if scenario.start.hold else ""
         yield from _some("start", [f"settles before time zero{held}"])
     yield from _some("probe", [f"{name}: {_probe(one)}" for name, one in model.probes.items()])

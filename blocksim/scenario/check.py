@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cache, partial
 from itertools import islice, pairwise
-from math import ceil, dist, inf
+from math import dist, inf
 from pathlib import Path
 from statistics import median
 from typing import cast, get_args
@@ -82,9 +82,6 @@ def unfit_choices(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     if scenario.systems.get("soils") and scenario.contact.model != "surface":
         message = f'{units.toml(scenario.contact.model)} does not go with soil; use model = "surface"'
         yield mistakes.Mistake(("contact", "model"), message, relation=True)
-    if scenario.start.settle and scenario.systems:
-        message = f"{', '.join(scenario.systems)} cannot settle: blocks and supports alone can"
-        yield mistakes.Mistake(("start", "settle"), message, relation=True)
     scheme, model, why = scenario.time.scheme, scenario.contact.model, ""  # why no block can have an outline
     if model not in scenario.time.models_of_outlines:
         reason = ": its boundary particles lie on rectangles only" if scenario.time.has_springs else ""
@@ -127,7 +124,7 @@ STEEPEST = 5.0
 LIGHTEST, HEAVIEST = 25.0, 25_000.0  # kg/m3: foams and osmium
 SOFTEST = 1e4  # Pa: gels
 LONGEST = 50.0  # m
-MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the square of the height
+MOST_GAPS = 5  # that are named
 
 
 def implausible_values(scenario: Scenario, placed: Sequence[placement.PlacedBody]) -> list[str]:
@@ -163,15 +160,11 @@ def implausible_values(scenario: Scenario, placed: Sequence[placement.PlacedBody
     warnings += _friction_angles(scenario)
     warnings += _impacts(scenario, placed)
     for soil in placement.soil_tables(scenario):
-        extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
-        counts = geometry.count_across(soil.corners, soil.spacing)
-        for way, extent, count in zip(("width", "height"), extents, counts, strict=True):
-            if extent - count * soil.spacing > MOST_EMPTY * extent:
-                fits = 1e3 * extent / ceil(extent / soil.spacing)
-                warnings.append(
-                    f"{overrides.format_key(('soils', soil.name, 'spacing'))} = {1e3 * soil.spacing:.4g} mm fills "
-                    f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
-                )
+        for name, width in islice(start.gaps(soil, scenario, placed), MOST_GAPS):
+            warnings.append(
+                f"soil {soil.name}: a gap of {1e3 * width:.3g} mm to {name}, {width / soil.spacing:.2g} spacings; until "
+                "it closes the soil slides and presses less or more than at rest: let the outline begin at that face"
+            )
     loose = overlap.support_warning(scenario, placed)
     return [*warnings, *cut_off(scenario, placed), *([loose] if loose else [])]
 

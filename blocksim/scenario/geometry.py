@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ Corner = tuple[float, float]
 Corners = tuple[Corner, ...]  # corners (m) counter-clockwise
 Edge = tuple[Corner, Corner, Corner]  # its ends (m) and its outward unit normal
 ROUND_OFF = 1e-9  # m; polygons that overlap by less touch
+LEAST_BAND = 2.0  # spacings: rows do not begin anew at level edges that are nearer to one another
 DISC_SHARE = 0.5 * (1.0 - 1e-6)  # radius of a particle in spacings, less what round-off may take
 
 
@@ -131,18 +133,87 @@ def self_crossings(corners: Floats) -> Iterator[tuple[int, int]]:
 
 
 def count_across(corners: Floats, spacing: float) -> tuple[int, int]:
-    """Return how many particles a lattice of this spacing (m) has along x and y of a polygon."""
-    columns, rows = np.floor((corners.max(axis=0) - corners.min(axis=0)) / spacing + 1e-6).astype(int)
+    """Return how many particles of this spacing (m), stretched to fill it, lie along x and y of a polygon."""
+    columns, rows = np.rint((corners.max(axis=0) - corners.min(axis=0)) / spacing).astype(int)
     return int(columns), int(rows)
 
 
-def fill_lattice(corners: Floats, spacing: float) -> Floats:
-    """Return the places (m, (n, 2)) of a square lattice whose discs of that diameter (m) lie in a polygon, by rows."""
-    columns, rows = count_across(corners, spacing)
-    x, y = corners.min(axis=0)[:, np.newaxis] + spacing * (np.arange(max(columns, rows)) + 0.5)
-    places = np.stack(np.meshgrid(x[:columns], y[:rows]), axis=-1).reshape(-1, 2)
-    kept = is_inside(places, corners) & (edge_distance(places, corners) >= DISC_SHARE * spacing)
-    return places[kept]
+def stretched(begin: float, end: float, spacing: float) -> Floats:
+    """Return places (m) from one to the other, both included, at equal distances next to a spacing (m)."""
+    return np.linspace(begin, end, round((end - begin) / spacing) + 1)
+
+
+def fill_rows(corners: Floats, spacing: float, obstacles: Sequence[Floats] = ()) -> tuple[Floats, float]:
+    """Return places (m, (n, 2)) of discs of a spacing (m) that fill a polygon by rows, and the area (m2) of the rows.
+
+    Rows begin and end at level edges, discs of a row at the edges beside it; between them distances are stretched.
+    There are none in obstacles and below them.
+    """
+    radius, half, places, area = DISC_SHARE * spacing, 0.5 * spacing, [np.zeros((0, 2))], 0.0
+    slack = half - radius
+    for low, high in pairwise(_levels(corners, spacing, obstacles)):
+        heights = stretched(low + half, max(high - half, low + half), spacing)
+        for y, crossings in zip(heights, crossings_below(corners, heights, axis=1), strict=True):
+            taken = np.concatenate([_reaches(one, y, radius) for one in (corners, *obstacles)])
+            shadows = [_shadow(one, y) for one in obstacles]
+            for begin, end in _free_parts(crossings, [*taken.tolist(), *shadows]):
+                x = stretched(begin + slack, max(end - slack, begin + slack), spacing)
+                places.append(np.stack([x, np.full_like(x, y)], axis=-1))
+                area += (end - begin + spacing) * (high - low) / len(heights)
+    return np.concatenate(places), area
+
+
+def _levels(corners: Floats, spacing: float, obstacles: Sequence[Floats]) -> list[float]:
+    """Return heights (m) of the bottom, of level edges that soil lies against, and of the top, apart by some spacings."""
+    levels = [float(begin[1]) for begin, end in _edges(corners) if begin[1] == end[1]]
+    for one in obstacles:
+        for begin, end in _edges(one):
+            above = begin + np.outer((0.1, 0.5, 0.9), end - begin) + (0.0, 0.25 * spacing)
+            if begin[1] == end[1] and any(~np.any([is_inside(above, other) for other in obstacles], axis=0)):
+                levels.append(float(begin[1]))
+    bottom, top = float(corners[:, 1].min()), float(corners[:, 1].max())
+    found = [bottom]
+    for level in sorted(levels):
+        if found[-1] + LEAST_BAND * spacing < level < top - LEAST_BAND * spacing:
+            found.append(level)
+    return [*found, top]
+
+
+def _reaches(corners: Floats, y: float, radius: float) -> Floats:
+    """Return from where to where (m, (n, 2)) places at height y are nearer than a radius (m) to the edges near it."""
+    begins, ends = corners, np.roll(corners, -1, axis=0)
+    is_near = (np.minimum(begins[:, 1], ends[:, 1]) < y + radius) & (np.maximum(begins[:, 1], ends[:, 1]) > y - radius)
+    begins, ends = begins[is_near], ends[is_near]
+    along = ends - begins
+    across = radius * np.stack([-along[:, 1], along[:, 0]], axis=-1) / np.hypot(*along.T)[:, np.newaxis]
+    found = []
+    with np.errstate(invalid="ignore", divide="ignore"):  # what is no number is not there
+        for corner in (begins, ends):
+            half = np.sqrt(radius**2 - (y - corner[:, 1]) ** 2)
+            found += [corner[:, 0] - half, corner[:, 0] + half]
+        for side in (begins + across, begins - across):
+            share = (y - side[:, 1]) / along[:, 1]
+            found.append(np.where((share >= 0.0) & (share <= 1.0), side[:, 0] + share * along[:, 0], np.nan))
+    return np.stack([np.fmin.reduce(found), np.fmax.reduce(found)], axis=-1)
+
+
+def _shadow(corners: Floats, y: float) -> list[float]:
+    """Return from where to where (m) some of a polygon is at height y or straight above; inf, -inf for none."""
+    (crossings,) = crossings_below(corners, np.array([y]), axis=1)
+    found = [*crossings, *corners[corners[:, 1] > y, 0]]
+    return [min(found, default=math.inf), max(found, default=-math.inf)]
+
+
+def _free_parts(crossings: Floats, taken: list[list[float]]) -> Iterator[tuple[float, float]]:
+    """Yield the parts (m) of a line inside a polygon, between pairs of crossings, that nothing takes."""
+    for begin, end in zip(crossings[::2].tolist(), crossings[1::2].tolist(), strict=True):
+        for first, last in sorted(taken):
+            if begin <= first < end:
+                yield begin, first
+            if first < end:
+                begin = max(begin, last)
+        if begin <= end:
+            yield begin, end
 
 
 FEWEST, MOST = 3, 16

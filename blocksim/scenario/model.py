@@ -58,7 +58,7 @@ def derived(*tables: str) -> "Callable[[Callable[[Model], T]], Derived[T]]":
 
 
 HASHED_TEXTS: list[Derived[list[str]]] = [
-    derived(table)(lambda model, table=table: resolution.hashed_texts(model.scenario, table))  # type: ignore[misc]
+    derived(table, "systems")(lambda model, table=table: resolution.hashed_texts(model.scenario, table))  # type: ignore[misc]
     for table in Scenario.model_fields
 ]
 
@@ -78,6 +78,7 @@ class Model:
     segments : straight pieces of ground and walls; none of level ground without a profile
     soils, probes : the tables of soil, and all probes by name, one of every actuator among them
     acting_loads : loads in the order of the file, those on sides of structures once a face
+    settles : True where the scene comes to rest before time zero
     motion, drives : displacement of the supports over time, and motions of driven bodies
     implausible_values : a warning for each value that is hardly meant
     hash : SHA-256 (hex) of all that determines motion and output, whatever the order of the file
@@ -138,6 +139,7 @@ class Model:
     acting_loads = derived(*GEOMETRY, "loads")(lambda model: (*acting_loads(model.scenario, model.placement),))
     motion = derived("motion", "time")(lambda model: motions.motion_pieces(model.scenario))
     drives = derived("bodies", "structures", "time", "motion")(lambda model: motions.drives_of(model.scenario))
+    settles = derived(*GEOMETRY, "start", "motion", "time")(lambda model: motions.settles(model.scenario, model.bodies))
     probes = derived("probes", "actuators")(lambda model: events.probes_of(model.scenario))
     implausible_values = derived(*Scenario.model_fields)(
         lambda model: check.implausible_values(model.scenario, model.bodies)

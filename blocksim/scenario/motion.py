@@ -1,13 +1,17 @@
 """Prescribed motion of supports and bodies over time, as piecewise cubics, and its peaks."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.scenario import geometry, placement
 from blocksim.scenario.models.motion import UNITS, Baseline, FromTable, Harmonic, Pulse, Ramp, Rotation
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.soil import SoilTable
+from blocksim.scenario.placement import PlacedBody
 
 Floats = NDArray[np.float64]
 
@@ -79,15 +83,45 @@ def motion_direction(scenario: Scenario) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-def settles(scenario: Scenario) -> bool:
-    """Return True where blocks come to rest before time zero: asked to, or under a pulse at its peak from there on.
+def settles(scenario: Scenario, placed: Sequence[PlacedBody]) -> bool:
+    """Return True where a scene comes to rest before time zero.
 
-    Unasked only with springs: rigid contacts carry the force of the first substep at once.
+    Where `start.settle` says so, where it does not say and a free block is beside soil that begins with its stresses,
+    and under a pulse at its peak from time zero on. That only with springs: rigid contacts carry the force of the first
+    substep at once.
     """
     motion = scenario.motion
+    if scenario.systems:
+        is_asked = scenario.start.settle
+        soils = () if is_asked is not None or motions_at_start(scenario, placed) else placement.soil_tables(scenario)
+        return bool(is_asked) or any(touches_free_block(soil, placed) for soil in soils)
     is_abrupt = isinstance(motion, Pulse) and motion.is_abrupt and motion.start == 0.0
     with_springs = scenario.time.has_springs
-    return scenario.start.settle or (is_abrupt and with_springs and not scenario.systems)
+    return bool(scenario.start.settle) or (is_abrupt and with_springs)
+
+
+def motions_at_start(scenario: Scenario, placed: Sequence[PlacedBody]) -> str:
+    """Return what keeps a scene with soil from settling; nothing without soil, or where nothing does."""
+    soils = placement.soil_tables(scenario)
+    for soil in soils:
+        if soil.start == "ramp":
+            return f'soil {soil.name} has start = "ramp"'
+    moving = [body.name for body in placed if body.driven or body.vx or body.vy or body.spin]
+    if soils and moving:
+        return f"body {moving[0]} moves"
+    return f"body {scenario.start.hold[0]} is held" if soils and scenario.start.hold else ""
+
+
+def touches_free_block(soil: SoilTable, placed: Sequence[PlacedBody]) -> bool:
+    """Return True if a block that may move is less than a spacing beside, below or above a soil, or in it."""
+    low, high = soil.corners.min(axis=0) - soil.spacing, soil.corners.max(axis=0) + soil.spacing
+    shifts = soil.spacing * np.array([(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)])
+    for body in placed:
+        corners = np.array([body.ground_point(*corner) for corner in body.corners])
+        is_near = not body.fixed and np.all(corners.max(axis=0) > low) and np.all(corners.min(axis=0) < high)
+        if is_near and any(geometry.overlap(soil.corners + shift, corners) for shift in shifts):
+            return True
+    return False
 
 
 def motion_pieces(scenario: Scenario) -> MotionPieces:

@@ -117,6 +117,8 @@ def deciding_values(scenario: Scenario, include: set[str] | None = None) -> dict
     All of it, or that of some fields.
     """
     data = scenario.model_dump(mode="json", include=include, exclude=UNHASHED)
+    if "start" in data and not scenario.systems:  # nothing that settles unasked
+        data["start"]["settle"] = bool(scenario.start.settle)
     if "motion" in data and isinstance(scenario.motion, motion.TABLED):
         data["motion"]["table"] = scenario.motion.table.digest
     for number, table in tables_of_bodies(scenario).items() if "bodies" in data else ():

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import events, geometry, laws, open_faces, overlap, overrides, placement, resolution
+from blocksim.scenario import events, geometry, laws, motion, open_faces, overlap, overrides, placement, resolution
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repetitions, unknown
 from blocksim.scenario.models.actuators import Actuator
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS, SUPPORT
@@ -114,21 +114,14 @@ def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequen
 MOST_NAMES = 3
 
 
-def particle_places(soil: SoilTable, placed: Sequence[PlacedBody]) -> NDArray[np.float64]:
-    """Return where the particles of a soil are at the start (m, (n, 2)).
+def particle_places(soil: SoilTable, placed: Sequence[PlacedBody]) -> tuple[NDArray[np.float64], float]:
+    """Return where the particles of a soil are at the start (m, (n, 2)), and the area (m2) of all of them.
 
     They fill its outline; what is poured in lies where no block is, or is above.
     """
-    places = geometry.fill_lattice(soil.corners, soil.spacing)
     if soil.kind != "fill":
-        return places
-    for _, corners in _blocks_in(soil, placed):
-        near = np.flatnonzero(np.all(places > corners.min(axis=0) - (soil.spacing, math.inf), axis=1))
-        near = near[np.all(places[near] < corners.max(axis=0) + soil.spacing, axis=1)]
-        is_free = geometry.height_above(corners, places[near]) == 0.0
-        is_free &= geometry.edge_distance(places[near], corners) >= geometry.DISC_SHARE * soil.spacing
-        places = np.delete(places, near[~is_free], axis=0)
-    return places
+        return geometry.fill_rows(soil.corners, soil.spacing)[0], geometry.area_of(soil.corners)
+    return geometry.fill_rows(soil.corners, soil.spacing, [corners for _, corners in _blocks_in(soil, placed)])
 
 
 def _blocks_in(soil: SoilTable, placed: Sequence[PlacedBody]) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -145,7 +138,7 @@ def meetings(soil: SoilTable, key: str, scenario: Scenario, placed: Sequence[Pla
     """Yield the key of an outline and what it meets: ground, walls, blocks that it is not poured onto, other soils."""
     found, corners = [*_boundaries(soil, scenario)], soil.corners
     if soil.kind == "fill":
-        if not len(particle_places(soil, placed)):
+        if not len(particle_places(soil, placed)[0]):
             found.append("blocks everywhere: no particle has room")
     elif blocks := [name for name, _ in _blocks_in(soil, placed)]:
         more = f" and {len(blocks) - MOST_NAMES} more" if len(blocks) > MOST_NAMES else ""
@@ -180,6 +173,54 @@ def _boundaries(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
         elif number > 0 and geometry.is_inside(begin + places * (end - begin) + back, corners).any():
             # nothing would hold soil that lies against the back of a wall
             yield f"the solid side of wall {number}, right of the way from its `from` to its `to`: exchange the two"
+
+
+WIDEST_GAP = 0.25  # spacings between soil and what it lies against: beyond, its thrust is another;
+WIDEST_BELOW = 1.0  # or between rows and what they end above or below if that is not level
+GAP_LENGTH = 2.0  # spacings: corners leave shorter ones
+LEVEL = 1.0 - 1e-9  # upward part of the normal of a level face
+
+
+def gaps(soil: SoilTable, scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[tuple[str, float]]:
+    """Yield the names of what soil lies beside but does not reach, with the width (m) of the gap."""
+    from scipy.spatial import cKDTree  # noqa: PLC0415 - it takes a quarter of a second
+
+    tree, spacing = cKDTree(particle_places(soil, placed)[0]), soil.spacing
+    low, high = soil.corners.min(axis=0) - spacing, soil.corners.max(axis=0) + spacing
+    blocks = [corners for _, corners in _blocks_in(soil, placed)] if soil.kind == "fill" else []
+    for name, begin, end in _faces(scenario, placed, low, high):
+        along = end - begin
+        out = np.array([along[1], -along[0]]) / np.hypot(*along)
+        count = math.ceil(2.0 * float(np.hypot(*along)) / spacing)
+        places = begin + (np.arange(count) + 0.5)[:, np.newaxis] / count * along
+        beside = places + spacing * out
+        is_soil = geometry.is_inside(beside, soil.corners)
+        for corners in blocks:
+            is_soil &= geometry.height_above(corners, beside) == 0.0
+        apart = tree.query(places[is_soil])[0] - 0.5 * spacing if is_soil.any() else np.zeros(0)
+        wide = apart[apart > (WIDEST_BELOW if 0.5 < abs(out[1]) < LEVEL else WIDEST_GAP) * spacing]
+        if len(wide) > 2.0 * GAP_LENGTH:
+            yield name, float(np.median(wide))
+
+
+def _faces(
+    scenario: Scenario, placed: Sequence[PlacedBody], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> Iterator[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
+    """Yield names and ends (m) of faces of bodies, walls and ground in a box, with the solid on the left."""
+    for body in placed:
+        corners = np.array([body.ground_point(*corner) for corner in body.corners])
+        if np.all(corners.max(axis=0) > low) and np.all(corners.min(axis=0) < high):
+            yield from ((f"block {body.name}", *ends) for ends in zip(corners, np.roll(corners, -1, axis=0), strict=True))
+    segments = placement.place_segments(scenario)
+    for number, one in enumerate(segments, start=1 - (len(segments) - len(scenario.walls))):
+        begin, along = np.array([one.x1, one.y1]), np.array([one.x0 - one.x1, one.y0 - one.y1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = np.sort([(low - begin) / along, (high - begin) / along], axis=0)
+        first, last = np.fmax.reduce([0.0, *shares[0]]), np.fmin.reduce([1.0, *shares[1]])
+        if first < last:
+            yield f"wall {number}" if number > 0 else "the ground", begin + first * along, begin + last * along
+    if scenario.ground.profile is None and low[1] < 0.0:
+        yield "the ground", np.array([high[0], 0.0]), np.array([low[0], 0.0])
 
 
 MAX_SEGMENTS = 1000
@@ -408,6 +449,14 @@ CHECKS = (
         )
     ),
     Check(lambda scenario, placed: _overlaps(scenario, placed())),
+    Check(
+        lambda scenario, placed: (
+            Mistake(("start", "settle"), f"a scene with soil settles where nothing moves before; {why}", relation=True)
+            for why in [scenario.start.settle and motion.motions_at_start(scenario, placed().bodies)]
+            if why
+        ),
+        {"start"},
+    ),
     Check(lambda scenario, placed: unfit_loads(scenario, placed()), {"loads", "actuators", "start"}),
     Check(
         lambda scenario, placed: (

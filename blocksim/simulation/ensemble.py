@@ -184,7 +184,7 @@ def _run_all(models: Iterable[Model], threads: int, most: int, *, peaks: bool) -
                     continue
                 first, scenes = batch[one.numbers[0]], one.scenes
                 try:
-                    if motions.settles(first.scenario):  # it has one scene
+                    if first.settles:  # it has one scene
                         scene = build.member(scenes, 0)
                         scene, _ = rest_state.initial_scene(scene, first, schemes.ALONE)
                         scenes = build.stack_of_one(scene)

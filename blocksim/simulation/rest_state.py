@@ -24,6 +24,13 @@ meet nothing on the way that is left to them.
 
 With `start.release = "always"` what does not come to rest begins its run from where it had begun to move, as fast as it
 did.
+
+Beside soil (`_BesideSystems`) blocks come to rest under their weight alone; then they are kept still while the soil comes
+to rest against them, at the pressure of a wall that does not yield; then both go on together. All that with the whole
+gravity and all friction, and kinetic damping of blocks and particles: the peaks are those of the energy of both. The
+energy that is taken away is an entry of the ledger. At rest are particles on which the mean unbalanced force is 1e-3 of
+their weight, and blocks with accelerations of 1e-3 of gravity. Where there is no equilibrium, the run begins with the
+motion of blocks and soil, as with `release = "always"`, or as all was placed where the soil flows beside still blocks.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -35,12 +42,18 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode, StoppedEarlyError
 from blocksim.kernels.common.arrays import LOAD_ACTUATOR, REACHED
-from blocksim.scenario import Model, motion, overlap, placement
-from blocksim.simulation import results, schemes
+from blocksim.kernels.common.systems import Coupled
+from blocksim.scenario import Model, overlap, placement
+from blocksim.simulation import balance, results, schemes
 from blocksim.world.build import arrays_of
+from blocksim.world.systems import others_of
+from blocksim.world.systems.system import Relaxation
 
 PARTS = 50  # in which gravity and loads grow
 BALANCE = 1e-8  # of gravity (and of the strongest load): accelerations at rest
+BALANCE_BESIDE = 1e-3  # the same beside soil, and the mean unbalanced force of particles over their weight
+CALL_BESIDE = 5  # steps between two looks at the kinetic energy beside soil: some waves pass in ten
+MOST_BESIDE = 30_000  # steps to come to rest in beside soil: what creeps on creeps in the run
 FIRST_SHARE, LAST_SHARE = 0.25, 1e-3  # of the inertial force: parts in which it grows, halved where one is too much
 UNASKED_SHARE = 0.01  # of the smallest side of a block: way in settling that was not asked for; what was to drop drops
 MOVED_SHARE = 0.25  # of the smallest side of a block: soft springs give way by as much as a tenth, what falls goes on
@@ -53,6 +66,7 @@ AHEAD = (0.02, 0.05, 0.1, MOVED_SHARE)  # of the smallest side: ways at which a 
 ARC = 2.0  # squares of these ways over that side, by which blocks on arcs overlap if they went straight on
 HELD = ("inverse_mass", "inverse_inertia", "counts")
 VELOCITIES = ("vx", "vy", "spin")
+ACCELERATIONS = ("ax", "ay", "spin_rate")
 FALLS = ("fx", "fy", "torque")
 SPRINGS = ("stiffness", "damping")
 PATHS = ("shift", "turn")  # pieces of driven bodies that hold
@@ -77,9 +91,9 @@ def initial_scene(
     StoppedEarlyError where `stop` says why.
     """
     scenario, placed = model.scenario, model.bodies
-    if scenario.start.settle:
+    if model.settles and (scenario.start.settle or isinstance(scene, Coupled)):
         return settle(scene, model, team, stop)
-    if not motion.settles(scenario) or any(body.vx or body.vy or body.spin for body in placed):
+    if not model.settles or any(body.vx or body.vy or body.spin for body in placed):
         return scene, None
     kept = [array.copy() for array in arrays_of(scene)]
     with suppress(SettleError):
@@ -110,13 +124,10 @@ def settle(
 
     Raises SettleError, and StoppedEarlyError where `stop` says why.
     """
-    run = _Settlement(scene, model, team, stop)
+    run = (_BesideSystems if isinstance(scene, Coupled) else _Settlement)(scene, model, team, stop)
     with run.without_time():
         try:
-            if not run.balance():
-                run.load_up()
-            run.rest(run.pace.most)
-            run.follow_support()
+            run.come_to_rest()
         except SettleError:
             if not run.is_released:
                 raise
@@ -124,6 +135,7 @@ def settle(
                 run.scene = run.lean[0]
                 _restore(*run.lean)
             run.leaving = {name: run.bodies[name].copy() for name in VELOCITIES}
+    books = run.books()
     run.begin()
     ways = run.ways()
     far = int(np.argmax(ways))
@@ -133,6 +145,7 @@ def settle(
         displaced_block=model.bodies[far].name,
         held=model.scenario.start.hold,
         at_rest=not run.leaving,
+        **books,
     )
 
 
@@ -142,6 +155,7 @@ class _Settlement:
     def __init__(self, scene: schemes.AnyScene, model: Model, team: schemes.Team, stop: Stop) -> None:
         scenario, placed = model.scenario, model.bodies
         self.scene, self.placed, self.team, self.stop = scene, placed, team, stop
+        self.model = model
         self.scheme = schemes.scheme_of(scene)
         self.pace = self.scheme.settling
         self.count = len(placed)
@@ -218,6 +232,21 @@ class _Settlement:
             self.bodies[name][self.held] = values
         for name, values in velocities.items():
             self.bodies[name] = values
+
+    def come_to_rest(self) -> None:
+        """Bring the scene to rest under all that acts on it. Raises SettleError."""
+        self.bear_loads()
+        self.follow_support()
+
+    def bear_loads(self) -> None:
+        """Bring the scene to rest under gravity and loads. Raises SettleError."""
+        if not self.balance():
+            self.load_up()
+        self.rest(self.pace.most)
+
+    def books(self) -> dict[str, float]:
+        """Return what the rest state says of energy; nothing where it is not kept."""
+        return {}
 
     def balance(self, inertial: float = 0.0) -> bool:
         """Return True once all loads are in equilibrium with contacts, as found without time, after steps with them.
@@ -316,9 +345,10 @@ class _Settlement:
         self.steps += self.pace.call
         self.scene, status = self._advanced(self.scene, self.steps)
         energy = self._kinetic()
-        if status != REACHED or not np.isfinite(energy) or self.ways().max() > MOVED_SHARE * self.smallest:
+        far = self._farthest()
+        if status != REACHED or not np.isfinite(energy) or far > MOVED_SHARE * self.smallest:
             raise self._error()
-        if self.is_released and self.ways().max() <= LEAN_SHARE * self.smallest:
+        if self.is_released and far <= LEAN_SHARE * self.smallest:
             self.lean = self.scene, [array.copy() for array in arrays_of(self.scene)]
         if energy < self.energy:
             self._stop()
@@ -405,6 +435,10 @@ class _Settlement:
         """Return how far every block has come (m)."""
         return np.where(self.is_free, schemes.corner_ways(self._places() - self.start, self.bodies["radius"]), 0.0)
 
+    def _farthest(self) -> float:
+        """Return how far (m) anything has come."""
+        return float(self.ways().max())
+
     def _error(self) -> SettleError:
         bodies = self.bodies
         speeds = np.hypot(bodies["vx"], bodies["vy"]) + bodies["radius"] * np.abs(bodies["spin"])
@@ -415,6 +449,112 @@ class _Settlement:
         moves = f"block {self.placed[fastest].name} moves at {MILLI * float(speeds[fastest]):.3g} mm/s, {come}, after "
         what = f"{moves}{self.steps} steps" if speeds.any() else f"{come} without meeting anything that holds it"
         return SettleError(f"the scene {results.NOT_AT_REST} (start.settle): {what}")
+
+
+class _BesideSystems(_Settlement):
+    """Blocks and further systems on their way to rest together."""
+
+    def __init__(self, scene: Any, model: Model, team: schemes.Team, stop: Stop) -> None:
+        super().__init__(scene, model, team, stop)
+        self.is_released = True
+        self.pace = self.pace._replace(call=CALL_BESIDE)
+        self.others = [one for one in others_of(model) if one.system.relaxation is not None]
+        self.taken = self.initial = 0.0  # J: from blocks; all that the scene held
+
+    @property
+    def parts(self) -> list[tuple[Relaxation, Any]]:
+        """What each system needs to come to rest, with its arrays."""
+        relaxations = [one.system.relaxation for one in self.others]
+        return [*zip(relaxations, self.scene.systems, strict=True)]  # type: ignore[union-attr, arg-type]
+
+    def come_to_rest(self) -> None:
+        """Bring blocks to rest alone, then the others beside blocks that are kept still, then all. Raises SettleError."""
+        as_placed = self.scene, [array.copy() for array in arrays_of(self.scene)]
+        if self.is_free.any():
+            self._bear_own_weight()
+        self.scene, _ = self._advanced(self.scene, 0)  # with the contacts that soil begins with
+        self.initial = balance.start_energy(self.scene)
+        try:
+            self._relax_beside_still_blocks()
+        except SettleError:
+            self.lean = as_placed
+            raise
+        placed, self.start, self.lean = self.start, self._places(), None  # soft springs give way by more than a fall
+        try:
+            self._relax()
+        finally:
+            self.start = placed
+
+    def _bear_own_weight(self) -> None:
+        """Bring blocks to rest under their weight, where that holds them without the others."""
+        world = self.scene.world
+        kept, alone = [array.copy() for array in arrays_of(world)], _Settlement(world, self.model, self.team, self.stop)
+        alone.is_released, alone.loads = False, world.loads.copy()
+        for name in FALLS:
+            alone.loads[name] = 0.0
+        try:
+            alone.bear_loads()
+            alone.begin()
+        except SettleError:
+            _restore(world, kept)
+            alone.scene = world
+        self.scene = self.scene._replace(world=alone.scene)
+        for name in FALLS:
+            self.scene.world.loads[name] = self.loads[name]
+
+    def _relax_beside_still_blocks(self) -> None:
+        world = self.scene.world
+        kept = [array.copy() for array in arrays_of(world)]
+        for name in (*HELD, *ACCELERATIONS):
+            self.bodies[name] = 0
+        is_free, self.is_free = self.is_free, np.zeros_like(self.is_free)
+        self._relax()
+        self.is_free = is_free
+        _restore(world, kept)  # contacts of bodies without mass are not kept
+        self.scene = self.scene._replace(world=world)
+
+    def _relax(self) -> None:
+        """Go on until all is at rest where velocities were taken away. Raises SettleError."""
+        self._stop()
+        self.steps = int(self.scene.world.clock[0].steps)
+        last = self.steps + MOST_BESIDE
+        self._go()
+        while self.energy > 0.0 or self._unrest() > BALANCE_BESIDE:
+            if self.steps > last:
+                raise self._error()
+            self._go()
+
+    def _farthest(self) -> float:
+        own = zip(self.others, self.scene.systems, strict=True)  # type: ignore[union-attr]
+        changes = [one.system.state(arrays, one.count)[:2] - one.elements.start[:2] for one, arrays in own]
+        return max([super()._farthest(), *(float(np.hypot(*change).max()) for change in changes)])
+
+    def _kinetic(self) -> float:
+        return super()._kinetic() + sum(one.kinetic(arrays) for one, arrays in self.parts)
+
+    def _stop(self) -> None:
+        self.taken += super()._kinetic()
+        super()._stop()
+        for one, arrays in self.parts:
+            one.halt(arrays)
+
+    def _unrest(self) -> float:
+        blocks = super()._unrest() if self.scale > 0.0 else 0.0
+        return max([blocks, *(one.unrest(arrays, self.scene.world) for one, arrays in self.parts)])
+
+    def books(self) -> dict[str, float]:
+        """Return the energy (J) that damping took, and the residual over the energy in play."""
+        if self.leaving:
+            return {}
+        ledger = balance.energy_ledger(self.scene, self.initial - self.taken)
+        damped = self.taken + float((ledger.model_extra or {}).get("soils_settling", 0.0))
+        return {"damping_J": damped, "energy_error": abs(ledger.residual) / max(ledger.in_play, damped)}
+
+    def begin(self) -> None:
+        """Make this time zero, for all systems."""
+        super().begin()
+        for one, arrays in self.parts:
+            one.begin(arrays)
 
 
 def _restore(scene: schemes.AnyScene, kept: Sequence[NDArray[Any]]) -> None:

@@ -32,7 +32,9 @@ class RestState(BaseModel, frozen=True):
     largest_displacement_mm: float
     displaced_block: str
     held: tuple[str, ...] = ()
-    at_rest: bool = True  # False where it was released all the same (`start.release`)
+    at_rest: bool = True  # False where it was released all the same (`start.release`, soil without an equilibrium)
+    damping_J: float | None = None  # noqa: N815 - beside soil: energy that damping took away meanwhile
+    energy_error: float | None = None  # the same: residual of the ledger meanwhile, over the energy in play
 
 
 class EventRecord(BaseModel, frozen=True):

@@ -320,6 +320,11 @@ def _warnings(model: Model, ended: loop.LoopResult, settled: results.RestState |
         yield "the run stopped after the fall, while blocks were moving: the final table is not that of rest"
     if every < (1.0 - memory.ROUNDING) * float(ended.scene.world.controls[0].step):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
+    if settled is not None and not settled.at_rest and scenario.systems:
+        yield (
+            f"no equilibrium before time zero: block {settled.displaced_block} moves on while the scene settles; the run "
+            f"begins with it {settled.largest_displacement_mm:.3g} mm from its place, as fast as it is there"
+        )
     yield from _convergence_warnings(scenario, convergence_of(ended.scene))
     yield from systems.warnings_of(model)
     for number in ended.pending if ended.outcome.status == "finished" else ():

@@ -45,7 +45,7 @@ from typing import Any
 
 from blocksim.errors import InvalidInputError, OutputError, StoppedEarlyError
 from blocksim.options import silent, takes
-from blocksim.scenario import Document, Model, PlacedBody, Source, document_of, laws, motion, placement
+from blocksim.scenario import Document, Model, PlacedBody, Source, document_of, laws, placement
 from blocksim.scenario.models import timeline
 from blocksim.simulation import observables, provenance, rest_state, schemes
 from blocksim.study import limit_answer, limit_plan, manifest, sweep, sweep_folder
@@ -301,7 +301,7 @@ def rest_acceleration(model: Model, least_moved: float | None) -> float:
     Zero where blocks settle before time zero, supports move, or nothing pulls.
     """
     scenario, time = model.scenario, model.scenario.time
-    if motion.settles(scenario) or scenario.motion is not None or not scenario.gravity > 0.0:
+    if model.settles or scenario.motion is not None or not scenario.gravity > 0.0:
         return 0.0
     moved = observables.MOVED_SHARE * placement.smallest_width(body for body in model.bodies if not body.fixed)
     way = moved if least_moved is None else least_moved
@@ -372,7 +372,7 @@ class _Search:
         plan, verdicts = self.plan, dict[Number, Stability]()
         while values := limit_plan.next_near(plan.span, verdicts, near, plan.tolerance):
             models = {value: plan.model_at(value) for value in values}
-            rests = {at: rest_state.rests(one) if motion.settles(one.scenario) else None for at, one in models.items()}
+            rests = {at: rest_state.rests(one) if one.settles else None for at, one in models.items()}
             verdicts |= {at: STOOD[one] for at, one in rests.items() if one is not None}
             if None in rests.values():
                 break
@@ -476,12 +476,12 @@ class _Search:
 
         A step given by hand is shorter with stiffer springs, in proportion.
         """
-        change, scenario = side.change, self.plan.model_at(side.change.low).scenario
+        change, model = side.change, self.plan.model_at(side.change.low)
+        scenario = model.scenario
         first = scale = scenario.contact.stiffness_scale
         given = limit_answer.StiffnessLevel(stiffness_scale=scale, low=change.low, high=change.high)
-        levels = Levels(
-            (given,), laws.LAWS[scenario.contact.law].compression(1.0, RATIO), is_at_rest=motion.settles(scenario)
-        )
+        compression = laws.LAWS[scenario.contact.law].compression(1.0, RATIO)
+        levels = Levels((given,), compression, is_at_rest=model.settles)
         share = side.give.share if side.give is not None else 0.0
         while levels.is_far and len(levels.levels) < 4:  # stiffnesses
             scale *= RATIO

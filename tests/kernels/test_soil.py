@@ -20,7 +20,7 @@ from blocksim.kernels.soil.stress import ROWS, invariants, share_of_row, strain
 from blocksim.kernels.sph.functions import wendland_slope
 from blocksim.scenario import Model, geometry
 from blocksim.simulation.schemes import build
-from blocksim.world.systems.soil_arrays import kind_records
+from blocksim.world.systems.soil_arrays import build_soils
 from blocksim.world.systems.soils import SMOOTHING
 from tests.soils import BLOCKS, FAR, LEFT, SMOOTH_WALLS, Soil, column, right, scene
 
@@ -29,7 +29,7 @@ STEP = 1e-5  # s
 
 def kind_of(material: str = "rods") -> Any:
     scenario = scene(column(0.04, 0.04, 0.005, material=material))
-    return kind_records(Model(scenario))[0]
+    return build_soils(Model(scenario)).kinds[0]
 
 
 def state_under(pressure: float) -> Any:

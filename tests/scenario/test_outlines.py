@@ -118,10 +118,10 @@ def test_polygons_overlap_where_they_have_more_than_edges_in_common(other: geome
 
 
 def test_a_lattice_keeps_its_discs_inside_and_the_weight_above_counts_what_is_there_only() -> None:
-    places = geometry.fill_lattice(SQUARE, 0.1)
-    assert len(places) == 100
+    places, area = geometry.fill_rows(SQUARE, 0.1)
+    assert (len(places), area) == (100, pytest.approx(1.0))
     assert places[0] == pytest.approx([0.05, 0.05])
-    sloping = geometry.fill_lattice(SLOPE, 0.05)
+    sloping, _ = geometry.fill_rows(SLOPE, 0.05)
     assert geometry.edge_distance(sloping, SLOPE).min() >= 0.499 * 0.05
     assert len(sloping) * 0.05**2 == pytest.approx(1.0, abs=0.05)
     points = np.array([[0.5, 0.5], [1.5, 0.25], [0.5, 2.5]])

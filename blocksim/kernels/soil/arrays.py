@@ -1,7 +1,7 @@
 """The arrays of all soils of a scene, with unit and sign of every field; SI units.
 
 `n` particles of one spacing s stand for prisms of s x s and the depth of the scene out of the plane, so that masses,
-forces and energies are those of blocks. Stresses are positive in tension. Particles are kept in the order of their
+forces and energies are those of blocks; where a soil is stretched to fill its outline, of what each has of its area. Stresses are positive in tension. Particles are kept in the order of their
 cells; `number` names them for whoever looks from outside.
 
 Losses are tallied by groups of particles, in their order, so that the bits of a sum depend on no number of threads.
@@ -36,6 +36,7 @@ STATE = record_type(
 )
 KIND = record_type(
     "density mass volume "  # kg/m3, kg, m3 of a particle
+    "share pitch_x pitch_y "  # -, m, m: volume over that of the first kind; distances along the rows and of the rows
     "lame shear bulk "  # Pa: Lame's first parameter, shear modulus, bulk modulus
     "slope cohesion "  # -, Pa: (J2)^(1/2) = cohesion - slope I1 is the yield surface
     "impedance "  # kg/(m2 s): density times wave speed
@@ -57,7 +58,7 @@ TALLY = record_type(
     "fastest",  # m/s: highest speed in the current drift
 )
 CONTROLS = record_type(
-    "area smoothing reach skin "  # m2, m, m, m: s^2; h; support radius; how much farther lists reach
+    "area volume smoothing reach skin "  # m2, m3, m, m, m: of a particle of the first kind; h; support; lists reach so far on
     "travel "  # m: no particle or body has moved farther since the lists were made
     "radius "  # m: of the disc that touches bodies
     "viscosity ramp "  # -, s: factor of artificial viscosity; until when gravity grows

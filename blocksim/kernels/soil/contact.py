@@ -317,7 +317,8 @@ def preload(soils: Soils, world: arrays.World) -> None:
         pressure -= radius * soils.kinds[state.kind].density * min(gravity_x * nx + gravity_y * ny, 0.0)
         if abs(distance - radius) < tolerances.AT_TOUCH * radius and state.syy < 0.0 and pressure > 0.0:
             stiffness = soils.interactions[state.kind, body.contact_class].normal_stiffness
-            touch.normal_force = pressure * soils.kinds[state.kind].volume / (2.0 * radius)
+            kind = soils.kinds[state.kind]
+            touch.normal_force = pressure * kind.volume / (abs(nx) * kind.pitch_x + abs(ny) * kind.pitch_y)
             touch.depth = touch.normal_force / stiffness
             point.x -= (touch.depth - radius + distance) * nx
             point.y -= (touch.depth - radius + distance) * ny

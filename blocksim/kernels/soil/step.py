@@ -4,7 +4,7 @@ Velocity Verlet as for bodies; at the start, while gravity grows or contacts fin
 
 Velocity gradients from neighbours, raw or corrected.
 
-With d = r_j - r_i, V the area s^2 and f = -W'/r > 0, so that grad_i W_ij = f d, the gradient is
+With d = r_j - r_i, V the area of a particle of the first kind and f = -W'/r > 0, so that grad_i W_ij = f d, the gradient is
 
     L = sum V (v_j - v_i) (x) f d B,    B = 1 (raw) or M^-1 with M = sum V f d (x) d (corrected; J. Bonet and
     T.-S. L. Lok, Comput. Methods Appl. Mech. Eng. 180 (1999) 97-115),
@@ -23,9 +23,10 @@ four from one, and the loops, which wait for nothing but registers, are up to 15
 
 Forces between particles: stress and artificial viscosity, each pair with exactly opposite forces.
 
-With d, f and V as in step.py and P = s B, the stress times the correction,
+With d, f and V as above, the volume W of a particle of the first kind, and P_i = (V_i / W) s B, the stress times the
+correction and what share of W it is in,
 
-    F_i = V_i sum V (P_i + P_j) f d,
+    F_i = W sum V (P_i + P_j) f d,
 
 the adjoint of the velocity gradient: sum F_i v_i = -sum V_i s_i : L_i, whatever B is. The artificial viscosity
 (J. J. Monaghan, Annu. Rev. Astron. Astrophys. 30 (1992) 543-574, without the quadratic term) acts between particles
@@ -229,9 +230,9 @@ def stress_particle(point: Record, state: Record, kind: Record, step: float) -> 
     That is what flow takes.
     """
     lost = stress.strain(state, kind, point.pxx, point.pxy, point.pyx, point.pyy, step)
-    point.pxx = state.sxx
-    point.pxy = point.pyx = state.sxy
-    point.pyy = state.syy
+    point.pxx = kind.share * state.sxx
+    point.pxy = point.pyx = kind.share * state.sxy
+    point.pyy = kind.share * state.syy
     return lost
 
 
@@ -250,10 +251,10 @@ def stress_corrected(
     wx, wy = point.pyx * bxx + point.pyy * bxy, point.pyx * bxy + point.pyy * byy
     lost = stress.strain(state, kind, ux, uy, wx, wy, step)
     bxx, bxy, byy = now
-    point.pxx = state.sxx * bxx + state.sxy * bxy
-    point.pxy = state.sxx * bxy + state.sxy * byy
-    point.pyx = state.sxy * bxx + state.syy * bxy
-    point.pyy = state.sxy * bxy + state.syy * byy
+    point.pxx = kind.share * (state.sxx * bxx + state.sxy * bxy)
+    point.pxy = kind.share * (state.sxx * bxy + state.sxy * byy)
+    point.pyx = kind.share * (state.sxy * bxx + state.syy * bxy)
+    point.pyy = kind.share * (state.sxy * bxy + state.syy * byy)
     return lost
 
 
@@ -321,10 +322,9 @@ def force_cluster(soils: arrays.Soils, c: int, near: Integers) -> float:
     """Add the forces between particles to those of a cluster; return the power (W) of the viscosity."""
     lanes = forces_on(soils, near, neighbours.places_of(soils, c))
     fx, fy, drag_x, drag_y = split(lanes[0]), split(lanes[1]), split(lanes[2]), split(lanes[3])
-    power = 0.0
+    power, volume = 0.0, soils.controls[0].volume
     for m in range(min(arrays.CLUSTER, soils.points.size - arrays.CLUSTER * c)):
         point, state = soils.points[arrays.CLUSTER * c + m], soils.states[arrays.CLUSTER * c + m]
-        volume = soils.kinds[state.kind].volume
         state.drag_x = volume * drag_x[m]
         state.drag_y = volume * drag_y[m]
         state.fx += volume * fx[m] + state.drag_x

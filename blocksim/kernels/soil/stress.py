@@ -186,27 +186,32 @@ def share_across(row: float, is_corrected: bool) -> float:
 
 
 @jit.rare_kernel
-def row_beside(world: arrays.World, b: int, x: float, y: float, spacing: float) -> tuple[float, float, float]:
+def row_beside(
+    world: arrays.World, b: int, x: float, y: float, radius: float, kind: arrays.Record
+) -> tuple[float, float, float]:
     """Return the row along a face of body b in which a place (m) is, and the normal; 0 if it is in none."""
-    if not is_near(world, b, x, y, ROWS * spacing):
+    if not is_near(world, b, x, y, ROWS * max(kind.pitch_x, kind.pitch_y)):
         return 0.0, 0.0, 1.0
-    distance, nx, ny = from_body(world, b, x, y, 0.5 * spacing)
+    distance, nx, ny = from_body(world, b, x, y, radius)
     if math.isinf(distance) or min(abs(nx), abs(ny)) > tolerances.OUT_OF_LINE:
         return 0.0, nx, ny
-    row = distance / spacing + 0.5
+    row = (distance - radius) / (kind.pitch_x if abs(nx) > 0.5 else kind.pitch_y) + 1.0
     nearest = math.floor(row + 0.5)
     return (nearest if nearest >= 1.0 and abs(row - nearest) < tolerances.OUT_OF_LINE else 0.0), nx, ny
 
 
 @jit.rare_kernel
-def shares_of_place(world: arrays.World, x: float, y: float, spacing: float, is_corrected: bool) -> tuple[float, float]:
+def shares_of_place(
+    world: arrays.World, x: float, y: float, radius: float, kind: arrays.Record
+) -> tuple[float, float]:
     """Return the stresses across upright and level faces at a place (m) over those far from all faces.
 
     Of faces to the same side, such as those of blocks on one another, the nearest counts.
     """
     left = right = below = above = ROWS + 1.0
+    is_corrected = kind.is_corrected != 0
     for b in range(world.bodies.size):
-        row, nx, ny = row_beside(world, b, x, y, spacing)
+        row, nx, ny = row_beside(world, b, x, y, radius, kind)
         if row > 0.0:
             left = min(left, row) if nx > 0.5 else left
             right = min(right, row) if nx < -0.5 else right
@@ -251,10 +256,10 @@ def balance(state: arrays.Record, kind: arrays.Record, along_x: float, along_y: 
 @jit.rare_kernel
 def balance_rows(soils: Soils, world: arrays.World) -> None:
     """Bring the stresses of all rows along faces into equilibrium; a particle in a corner is in a row of both."""
-    spacing = 2.0 * soils.controls[0].radius
+    radius = soils.controls[0].radius
     for i in range(soils.points.size):
         point, state = soils.points[i], soils.states[i]
         kind = soils.kinds[state.kind]
         if state.syy < 0.0:
-            along_x, along_y = shares_of_place(world, point.x, point.y, spacing, kind.is_corrected != 0)
+            along_x, along_y = shares_of_place(world, point.x, point.y, radius, kind)
             balance(state, kind, along_x, along_y)

@@ -122,13 +122,15 @@ NOTHING_HELD = {"hold": "[]", "release": "at rest"}
 
 
 class Start(Table):
-    """What happens before time zero: nothing, or the blocks settle under gravity and the loads of time zero.
+    """What happens before time zero: nothing, or the scene settles under gravity and the loads of time zero.
 
-    They also do under a pulse that begins at its peak at time zero; see `blocksim.scenario.motion.settles`.
+    Unless it is said, `blocksim.scenario.motion.settles` decides.
     """
 
-    settle: bool = setting(
-        "true to bring all to rest before time zero, with the contact forces that hold it", default=False
+    settle: bool | None = setting(
+        "true to bring all to rest before time zero, with the contact forces that hold it (default: true where a free "
+        "block is beside soil, and under a pulse at its peak from time zero on; else false)",
+        None,
     )
     hold: tuple[str, ...] = setting("names of bodies that are kept still meanwhile and released at time zero", ())
 

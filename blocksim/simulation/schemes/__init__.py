@@ -22,7 +22,7 @@ from blocksim.errors import BlocksimError, InvalidInputError, OutputError
 from blocksim.kernels.common import arrays, compiler, jit, systems
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.options import silent
-from blocksim.scenario import Model, Scenario, motion, overlap
+from blocksim.scenario import Model, Scenario, overlap
 from blocksim.scenario.models.timeline import SCHEMES as TABLES
 from blocksim.scenario.structures.base import PolygonStructure
 from blocksim.simulation import trajectory
@@ -200,9 +200,9 @@ def build_stacks(models: Sequence[Model]) -> Iterator[scenes.SceneStack | scenes
     with events or that settles before it begins, is a stack of its own.
     """
     keys: list[str | None] = []
-    for scenario in (model.scenario for model in models):
-        scheme = SCHEMES[scenario.time.scheme]
-        is_alone = scenario.systems or scenario.events or scheme.advance_members is None or motion.settles(scenario)
+    for model in models:
+        scheme = SCHEMES[model.scenario.time.scheme]
+        is_alone = model.scenario.systems or model.scenario.events or scheme.advance_members is None or model.settles
         keys.append(None if is_alone else scheme.name)
     for places in scenes.group_equal(keys):
         key = keys[places[0]]

@@ -9,10 +9,10 @@ from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.common.systems import Stages
 from blocksim.kernels.soil import arrays, contact, step
 from blocksim.kernels.sph.functions import WENDLAND_SUPPORT
-from blocksim.scenario import GROUND, Model
+from blocksim.scenario import GROUND, Model, geometry
 from blocksim.scenario.models.soil import RAMP_TIME
 from blocksim.world import build, interactions
-from blocksim.world.systems import soils
+from blocksim.world.systems import soils, system
 
 STAGES = Stages(step.start, step.finish, step.survey, step.measure)
 ACTS = {"soils": step.flow, "blocks": contact.touch_blocks, "supports": contact.touch_supports}
@@ -38,7 +38,9 @@ def build_soils(model: Model) -> arrays.Soils:
     bodies = len(model.bodies) + len(model.segments) + 1
     spacing, controls = tables[0].spacing, zeros(1, arrays.CONTROLS)
     one = controls[0]
-    one.area = spacing**2
+    kinds_of = kind_records(model, elements.constants[0][np.searchsorted(states["kind"], np.arange(len(tables)))])
+    one.volume = kinds_of["volume"][0]
+    one.area = one.volume / soils.depth_of_scene(model)
     one.smoothing = soils.SMOOTHING * spacing
     one.reach = WENDLAND_SUPPORT * one.smoothing
     one.skin = 0.4 * spacing  # of lists, in spacings
@@ -50,7 +52,7 @@ def build_soils(model: Model) -> arrays.Soils:
     return arrays.Soils(
         points=points,
         states=states,
-        kinds=kind_records(model),
+        kinds=kinds_of,
         interactions=interactions_with(model),
         order=build.numbers(n, np.uint32),
         starts=build.numbers(3 * n // 2 + 3, np.uint32),
@@ -67,17 +69,18 @@ def build_soils(model: Model) -> arrays.Soils:
     )
 
 
-def kind_records(model: Model) -> Any:
-    """Return one KIND for each soil."""
+def kind_records(model: Model, masses: system.Floats) -> Any:
+    """Return one KIND for each soil, given the mass (kg) of a particle of each."""
     scenario, tables = model.scenario, model.soils
     records = zeros(len(tables), arrays.KIND)
-    depth = soils.depth_of_scene(model)
-    for record, table in zip(records, tables, strict=True):
+    for record, table, mass in zip(records, tables, masses, strict=True):
         material = scenario.materials[table.material]
         lame, shear = soils.lame_constants(material)
         record.density = material.density
-        record.volume = table.spacing**2 * depth
-        record.mass = material.density * record.volume
+        record.mass, record.volume = mass, mass / material.density
+        record.share = record.volume / records["volume"][0]
+        counts = geometry.count_across(table.corners, table.spacing)
+        record.pitch_x, record.pitch_y = (np.ptp(table.corners, axis=0) - table.spacing) / (np.array(counts) - 1.0)
         record.lame, record.shear, record.bulk = lame, shear, lame + 2.0 * shear / 3.0
         record.slope, record.cohesion = soils.yield_surface(material)
         record.impedance = material.density * soils.wave_speed(material)

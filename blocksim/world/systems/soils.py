@@ -176,6 +176,33 @@ def body_contacts(soils: Any, world: Any) -> system.BodyContacts:
     return system.BodyContacts(*numbers, place, -normal, push, -rub, friction)
 
 
+def kinetic_energy(soils: Any) -> float:
+    """Return the kinetic energy (J) of all particles."""
+    points = soils.points
+    return 0.5 * float(np.sum(soils.kinds["mass"][soils.states["kind"]] * (points["vx"] ** 2 + points["vy"] ** 2)))
+
+
+def mean_unrest(soils: Any, world: Any) -> float:
+    """Return the mean force on particles that is not balanced, over their mean weight; without weight over nothing."""
+    mass, controls = soils.kinds["mass"][soils.states["kind"]], world.controls[0]
+    gravity_x, gravity_y = float(controls.gravity_x), float(controls.gravity_y)
+    forces = np.hypot(soils.states["fx"] + mass * gravity_x, soils.states["fy"] + mass * gravity_y)
+    return float(forces.mean()) / (float(mass.mean()) * math.hypot(gravity_x, gravity_y) or math.inf)
+
+
+def halt(soils: Any) -> None:
+    """Take the velocities of all particles away; what they held is lost to settling."""
+    soils.tallies["settling"][0] += kinetic_energy(soils)
+    soils.points["vx"] = soils.points["vy"] = 0.0
+
+
+def begin(soils: Any) -> None:
+    """Begin the books of soils anew; what damps them at the start has done so."""
+    for name in soils.tallies.dtype.names:
+        soils.tallies[name] = 0.0
+    soils.kinds["settled"] = 0.0
+
+
 def parts_of(track: system.Track) -> dict[str, system.Indices]:
     """Return the numbers of the particles of each soil; they are called SOIL.NUMBER."""
     owners = np.array([name.rpartition(".")[0] for name in track.names])
@@ -305,11 +332,13 @@ SHADES = (
 def elements_of(model: Model) -> system.Elements:
     """Return the particles of all soils of a scenario."""
     scenario, tables = model.scenario, model.soils
-    places = [start.particle_places(table, model.bodies) for table in tables]  # m, (n, 2)
+    filled = [start.particle_places(table, model.bodies) for table in tables]
+    places, areas = [one for one, _ in filled], [area / len(one) for one, area in filled]  # m, (n, 2); m2 of each
     soils = [*zip(tables, places, strict=True)]
     names = tuple(f"{table.name}.{number}" for table, one in soils for number in range(1, len(one) + 1))
     depth = depth_of_scene(model)
-    each = [scenario.materials[table.material].density * table.spacing**2 * depth for table in tables]
+    densities = [scenario.materials[table.material].density for table in tables]
+    each = [density * area * depth for density, area in zip(densities, areas, strict=True)]
     masses = np.repeat(each, [len(one) for one in places])
     constants = np.stack([masses, np.full(len(names), tables[0].spacing)])
     initial = np.zeros((len(QUANTITIES), len(names)))
@@ -365,6 +394,7 @@ SOILS = system.System(
     build=lambda model: soil_kernels().build_soils(model),
     largest_step=_largest_step,
     stages=lambda: soil_kernels().STAGES,
+    relaxation=system.Relaxation(kinetic_energy, mean_unrest, halt, begin),
     cost=COST,
     dearer=lambda model: max(GRADIENT_COST[table.gradient] for table in model.soils),
     parts=lambda model: tuple(table.name for table in model.soils),

@@ -89,6 +89,15 @@ class Cost:
     memory: int = 400  # bytes of its arrays
 
 
+class Relaxation(NamedTuple):
+    """What bringing a scene to rest needs of the arrays of a system."""
+
+    kinetic: Callable[[Any], float]  # J
+    unrest: Callable[[Any, Any], float]  # mean force that is not balanced over the mean weight, given the world too
+    halt: Callable[[Any], None]  # takes all velocities away, and books what they held as a loss
+    begin: Callable[[Any], None]  # begins its books anew, at rest
+
+
 @dataclass(frozen=True)
 class System:
     """One kind of thing that fills a scene.
@@ -108,6 +117,7 @@ class System:
     build: Callable[[Model], Any] | None = None  # its arrays at time zero, where they are not in the world
     largest_step: Callable[[Model], float] | None = None  # s; None: the scheme knows
     stages: Callable[[], "Stages"] | None = None  # its compiled functions, where they are not those of a scheme
+    relaxation: Relaxation | None = None  # None: a scene with it cannot be brought to rest
     cost: Cost = field(default_factory=Cost)  # of every element, where it is not part of the blocks'
     dearer: Callable[[Model], float] = lambda _: 1.0  # time of a step of the elements of a scene over that, at most
     parts: Callable[[Model], tuple[str, ...]] | None = None  # names of its tables, which probes of force may name

@@ -59,15 +59,18 @@ def test_fill_lies_around_and_above_blocks_but_not_in_and_below_them() -> None:
     scenario = scenario_from_mapping(arch_under(0.8))
     (soil,) = placement.soil_tables(scenario)
     bodies = Model(scenario).bodies
-    places, whole = start.particle_places(soil, bodies), geometry.fill_lattice(soil.corners, soil.spacing)
+    places, area = start.particle_places(soil, bodies)
     outlines = [np.array([body.ground_point(*at) for at in body.corners]) for body in bodies]
     apart = np.min([geometry.edge_distance(places, corners) for corners in outlines], axis=0)
     assert apart.min() >= 0.4999 * soil.spacing
     for corners in outlines:
         assert not geometry.is_inside(places, corners).any()
-    covered = np.max([geometry.height_above(corners, whole) for corners in outlines], axis=0) > 0.0
-    near = np.min([geometry.edge_distance(whole, corners) for corners in outlines], axis=0) < 0.4999 * soil.spacing
-    assert len(places) == np.count_nonzero(~covered & ~near)
+        assert not geometry.height_above(corners, places).any()
+    grid = np.stack(np.meshgrid(np.arange(-0.0975, 1.5, 5e-3), np.arange(2.5e-3, 0.8, 5e-3)), axis=-1).reshape(-1, 2)
+    covered = np.max([geometry.height_above(corners, grid) for corners in outlines], axis=0) > 0.0
+    covered |= np.any([geometry.is_inside(grid, corners) for corners in outlines], axis=0)
+    assert area == pytest.approx(25e-6 * np.count_nonzero(~covered), rel=0.02)
+    assert [*start.gaps(soil, scenario, bodies)] == []
 
 
 def test_fill_without_room_for_a_particle_says_so() -> None:
