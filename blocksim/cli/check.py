@@ -149,7 +149,8 @@ def _limits(limits: describe.StepLimits | None) -> list[str]:
         return [f"           {steps}"]
     who = "blocks" if ratio < 1.0 else "systems beside the blocks"
     more = f"{max(ratio, 1.0 / ratio):.0f} times as many steps as without them"
-    cure = f"contact.stiffness_scale = {limits.scale:.1g} makes both equal"
+    use = "makes both equal" if limits.advised == limits.scale else "is the least with which blocks sink little"
+    cure = f"contact.stiffness_scale = {limits.advised:.1g} {use}"
     return [f"           {steps}", f"warning: because of the {who} {more}:", f"         {cure}"]
 
 

@@ -24,7 +24,7 @@ from blocksim.simulation.interruption import WallTime, stop_requests
 from blocksim.simulation.rest_state import initial_scene
 from blocksim.simulation.stores.hdf5 import FrameFile
 from blocksim.simulation.trajectory import final_columns
-from blocksim.world import build, free_memory, memory, systems
+from blocksim.world import build, free_memory, memory, sag, systems
 
 CHECKPOINT_FILES = len(files.CHECKPOINTS) + 1  # the last one while it is written
 
@@ -327,6 +327,9 @@ def _warnings(model: Model, ended: loop.LoopResult, settled: results.RestState |
         )
     yield from _convergence_warnings(scenario, convergence_of(ended.scene))
     yield from systems.warnings_of(model)
+    soft = sag.soft_base(scenario, placed, ended.scene.world) if scenario.systems and placed else None
+    if soft is not None and soft.warning:
+        yield soft.warning
     for number in ended.pending if ended.outcome.status == "finished" else ():
         what = events.describe_event(scenario.events[number])
         yield f"events.{number} has not happened, as nothing came to rest: {what}"

@@ -9,7 +9,7 @@ from blocksim.kernels.common.arrays import World
 from blocksim.scenario import GROUND, Model, PlacedBody, geometry, laws, motion
 from blocksim.world import build, interactions, memory, nonsmooth, rigid_step, systems
 from blocksim.world.bodies import Layout, division, layout_of
-from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
+from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag, soft_base
 from blocksim.world.step import bounds_of, speeds_of, step_of_contacts
 
 # measured on one core: a step costs about this for every body with its contacts
@@ -75,7 +75,8 @@ class StepLimits:
 
     blocks: float  # s
     systems: float  # s
-    scale: float  # contact.stiffness_scale with which both are the same
+    scale: float  # contact.stiffness_scale with which both are the same,
+    advised: float  # or the least one with which blocks do not sink too far into their springs
 
 
 @dataclass(frozen=True)
@@ -127,10 +128,14 @@ def describe(model: Model) -> Description:
     contacts = max(memory.CONTACTS_OF_A_BODY * count, touching) if scenario.output.contacts else 0
     more = sum(one.count * one.system.cost.memory for one in others)
     of_systems = sum(one.count * one.system.cost.seconds * one.system.dearer(model) for one in others)
+    warnings = [*systems.warnings_of(model)]
     limits, of_others = None, systems.largest_step(model)
     if scenario.time.has_springs and of_others < math.inf:
         of_blocks = step_of_contacts(layout, bounds, speeds)
-        limits = StepLimits(of_blocks, of_others, scenario.contact.stiffness_scale * (of_blocks / of_others) ** 2)
+        soft = soft_base(scenario, layout.placed, world)
+        scale = scenario.contact.stiffness_scale * (of_blocks / of_others) ** 2
+        limits = StepLimits(of_blocks, of_others, scale, max(scale, 0.0 if soft is None else soft.scale))
+        warnings = [*warnings, soft.warning] if soft is not None and soft.warning else warnings
     rigid = None
     if has_rigid:
         reason = rigid_step.reason_of_step(layout, bounds, speeds)
@@ -170,7 +175,7 @@ def describe(model: Model) -> Description:
         rigid=rigid,
         systems={one.system.name: one.count for one in others},
         limits=limits,
-        warnings=tuple(systems.warnings_of(model)),
+        warnings=tuple(warnings),
     )
 
 

@@ -19,13 +19,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from blocksim.kernels.common.arrays import World
 from blocksim.kernels.nonsmooth.arrays import AWAY, NOT_STRUCK, Nonsmooth
-from blocksim.scenario import PlacedBody, geometry, placement
+from blocksim.scenario import PlacedBody, Scenario, geometry, placement
+from blocksim.scenario.laws import LAWS
 
 TOUCHING = 1e-3  # of the smallest side: faces that near to each other touch
 FREQUENCY = 0.125  # of the soft contact, per substep: w h = 2 pi / 8. Above 0.15 walls spread like a fluid
 DAMPING = 10.0  # damping ratio of the soft contact
 WARNING_SHARE = 0.01  # of the smallest side: overlap of any contact
+SOFT_SHARE = 0.001  # of the smallest side: overlap under the weight above, beside soil
 CRUSHED_SHARE = 0.001  # of the smallest side: sag of what light blocks carry that is heavier by at least UNLIKE
 UNLIKE = 10.0  # ratio of masses; walls and stacks of alike blocks are far from it
 DRIFT = 25.0  # substeps: time constant of the soft contact, 2 zeta / w
@@ -111,6 +114,52 @@ def _lever(one: float, two: float, x: float) -> float:
     if one == two:
         return 0.5
     return min(1.0, max(0.0, (x - one) / (two - one)))
+
+
+class SoftBase(NamedTuple):
+    """The contact on springs that gives way most under the weight above it."""
+
+    block: str  # above the contact
+    overlap: float  # m
+    share: float  # of the smallest side
+    scale: float  # contact.stiffness_scale with which that would be SOFT_SHARE
+
+    @property
+    def warning(self) -> str:
+        """What to say where soil would move with it; empty where it is stiff enough."""
+        if self.share <= SOFT_SHARE:
+            return ""
+        return (
+            f"block {self.block} sinks {MILLI * self.overlap:.2g} mm into its springs under the weight above, "
+            f"{self.share:.1%} of the smallest side, and walls lean the more beside soil: "
+            f"contact.stiffness_scale = {self.scale:.1g} keeps it to {SOFT_SHARE:.1%}"
+        )
+
+
+def soft_base(scenario: Scenario, placed: Sequence[PlacedBody], world: World) -> SoftBase | None:
+    """Return the contact of blocks at rest that gives way most; None where springs are not linear, or none is loaded.
+
+    `world` has the stiffnesses of contact points, of which a face has two.
+    """
+    classes, values = world.bodies["contact_class"], world.interactions["normal_stiffness"]
+    if not scenario.time.has_springs or not LAWS[scenario.contact.law].is_linear:
+        return None
+    found = [
+        (load.force / float(values[classes[load.upper], classes[-1 if load.lower is None else load.lower]]), load)
+        for load in loads_at_rest(placed, scenario.gravity)
+    ]
+    overlap, load = max(found, key=lambda one: one[0], default=(0.0, None))
+    if load is None or not overlap > 0.0:
+        return None
+    share = overlap / placement.smallest_width(placed)
+    scale = scenario.contact.stiffness_scale * share / SOFT_SHARE
+    return SoftBase(placed[load.upper].name, overlap, share, rounded_up(scale))
+
+
+def rounded_up(scale: float) -> float:
+    """Return the next number above with one digit."""
+    power = 10.0 ** math.floor(math.log10(scale))
+    return math.ceil(scale / power - 1e-9) * power
 
 
 class SoftContact(NamedTuple):
