@@ -141,8 +141,8 @@ def _end_lines(result: Result, shown: Sequence[str]) -> Iterator[str]:
     )
     if summary.settled is not None:
         far = f"{output.number(summary.settled.largest_displacement_mm)} mm (block {summary.settled.displaced_block})"
-        settled = "settled" if summary.settled.at_rest else "no equilibrium: released while it was settling"
-        yield f"{settled} before time zero in {summary.settled.steps} steps; largest displacement {far}"
+        settled = "settled before time zero in" if summary.settled.at_rest else "no equilibrium: released after"
+        yield f"{settled} {summary.settled.steps} steps; largest displacement {far}"
     yield from (f"{one.time_s:.3f} s: {one.what}" for one in summary.events)
     moved = summary.movement
     if moved is not None:  # what moved, how far on the way and first: blocks may end nearer
