@@ -457,6 +457,14 @@ CHECKS = (
         ),
         {"start"},
     ),
+    Check(
+        lambda scenario, placed: (
+            Mistake(("soils", number, "lifts"), "lifts are filled in while a scene settles, and this one does not")
+            for number, soil in enumerate(placement.soil_tables(scenario))
+            if soil.lifts > 1 and not motion.settles(scenario, placed().bodies)
+        ),
+        {"start"},
+    ),
     Check(lambda scenario, placed: unfit_loads(scenario, placed()), {"loads", "actuators", "start"}),
     Check(
         lambda scenario, placed: (

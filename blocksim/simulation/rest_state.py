@@ -459,7 +459,8 @@ class _BesideSystems(_Settlement):
         self.is_released = True
         self.pace = self.pace._replace(call=CALL_BESIDE)
         self.others = [one for one in others_of(model) if one.system.relaxation is not None]
-        self.taken = self.initial = 0.0  # J: from blocks; all that the scene held
+        self.taken = self.initial = 0.0  # J: from blocks; all that the scene held, and what came in with lifts
+        self.is_still = False  # blocks are
 
     @property
     def parts(self) -> list[tuple[Relaxation, Any]]:
@@ -472,18 +473,32 @@ class _BesideSystems(_Settlement):
         as_placed = self.scene, [array.copy() for array in arrays_of(self.scene)]
         if self.is_free.any():
             self._bear_own_weight()
-        self.scene, _ = self._advanced(self.scene, 0)  # with the contacts that soil begins with
-        self.initial = balance.start_energy(self.scene)
-        try:
-            self._relax_beside_still_blocks()
-        except SettleError:
-            self.lean = as_placed
-            raise
-        placed, self.start, self.lean = self.start, self._places(), None  # soft springs give way by more than a fall
-        try:
-            self._relax()
-        finally:
-            self.start = placed
+        lifts = [relaxation.lifts(self.model) for relaxation, _ in self.parts]
+        placed, self.start = self.start, self._places()  # soft springs give way by more than a fall
+        for lift in range(1, max(lifts) + 1):
+            self.lean = None
+            try:
+                self._fill_in(lift, lifts)
+                self._relax_beside_still_blocks()
+                self._relax()
+            except SettleError:
+                is_last = lift == max(lifts) and not self.is_still
+                self.lean = self.lean if is_last else as_placed
+                self.start = placed
+                raise
+        self.start = placed
+
+    def _fill_in(self, lift: int, lifts: Sequence[int]) -> None:
+        """Fill in a lift, where there are more than one, and take what the scene holds then as given."""
+        before = balance.start_energy(self.scene) if lift > 1 else 0.0
+        if max(lifts) > 1:
+            filled = [
+                relaxation.with_lift(self.model, arrays if lift > 1 else None, lift) if lift <= most else arrays
+                for most, (relaxation, arrays) in zip(lifts, self.parts, strict=True)
+            ]
+            self.scene = self.scene._replace(systems=tuple(filled))
+        self.scene, _ = self._advanced(self.scene, int(self.scene.world.clock[0].steps))  # contacts that it begins with
+        self.initial += balance.start_energy(self.scene) - before
 
     def _bear_own_weight(self) -> None:
         """Bring blocks to rest under their weight, where that holds them without the others."""
@@ -507,9 +522,9 @@ class _BesideSystems(_Settlement):
         kept = [array.copy() for array in arrays_of(world)]
         for name in (*HELD, *ACCELERATIONS):
             self.bodies[name] = 0
-        is_free, self.is_free = self.is_free, np.zeros_like(self.is_free)
+        is_free, self.is_free, self.is_still = self.is_free, np.zeros_like(self.is_free), True
         self._relax()
-        self.is_free = is_free
+        self.is_free, self.is_still = is_free, False
         _restore(world, kept)  # contacts of bodies without mass are not kept
         self.scene = self.scene._replace(world=world)
 
@@ -527,7 +542,7 @@ class _BesideSystems(_Settlement):
     def _farthest(self) -> float:
         own = zip(self.others, self.scene.systems, strict=True)  # type: ignore[union-attr]
         changes = [one.system.state(arrays, one.count)[:2] - one.elements.start[:2] for one, arrays in own]
-        return max([super()._farthest(), *(float(np.hypot(*change).max()) for change in changes)])
+        return max([super()._farthest(), *(float(np.nanmax(np.hypot(*change))) for change in changes)])
 
     def _kinetic(self) -> float:
         return super()._kinetic() + sum(one.kinetic(arrays) for one, arrays in self.parts)

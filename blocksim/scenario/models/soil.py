@@ -56,6 +56,12 @@ class SoilTable(SystemTable):
     start: Annotated[Start, OneOf(get_args(Start))] = setting(
         "geostatic: stresses of the weight above; ramp: no stress, and gravity grows over 0.1 s", "geostatic"
     )
+    lifts: int = setting(
+        "number of layers in which soil is filled in while the scene settles, each at rest before the next one; the "
+        "greatest of all soils counts",
+        1,
+        ge=1,
+    )
     gradient: Annotated[Gradient, OneOf(get_args(Gradient))] = setting(
         "corrected, or raw: two thirds of the time, but on a rough base too little thrust on blocks", "corrected"
     )
@@ -118,6 +124,8 @@ class SoilTable(SystemTable):
             most = MILLI * thinnest.least_width / SPACINGS_A_SIDE
             which = f"of the blocks, which body {thinnest.name} has"
             unfit.append(f"above an eighth of the smallest side {which}: at most {most:.4g} mm")
+        if self.lifts > across[1]:
+            yield "lifts", f"{self.lifts} lifts of {across[1]} rows of particles; at most one a row"
         if min(across) < LEAST_ACROSS:
             unfit.append(f"only {min(across)} particles across; at least {LEAST_ACROSS} are needed")
         if across[0] * across[1] > MOST_PARTICLES:

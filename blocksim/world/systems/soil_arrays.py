@@ -24,21 +24,44 @@ VISCOSITY = 0.003
 
 def build_soils(model: Model) -> arrays.Soils:
     """Return the arrays of the soils of a scenario at time zero."""
-    tables, elements = model.soils, soils.elements_of(model)
-    initial, kinds = elements.start, {table.name: number for number, table in enumerate(tables)}
+    elements = soils.elements_of(model)
+    return arrays_of(model, elements, np.arange(len(elements.names)))
+
+
+def with_lift(model: Model, before: arrays.Soils | None, count: int) -> arrays.Soils:
+    """Return the arrays of the first so many lifts, given those of one fewer, or None; what these hold goes on."""
+    after = arrays_of(model, *soils.in_lifts(model, count))
+    if before is None:
+        return after
+    place = np.searchsorted(after.states["number"], before.states["number"])
+    after.points[place], after.states[place] = before.points, before.states
+    for name in ("touches", "kept"):
+        getattr(after, name)[: getattr(before, name).size] = getattr(before, name)
+    for name in before.tallies.dtype.names:
+        after.tallies[name][0] = before.tallies[name].sum()
+    after.controls["touch_count"] = before.controls["touch_count"]
+    after.controls["is_listed"], after.controls["travel"] = 1, np.inf  # new lists, without another start
+    return after
+
+
+def arrays_of(model: Model, elements: system.Elements, chosen: system.Indices) -> arrays.Soils:
+    """Return the arrays of some of these particles, in their order."""
+    tables, names = model.soils, [elements.names[number] for number in chosen]
+    initial, kinds = elements.start[:, chosen], {table.name: number for number, table in enumerate(tables)}
     n = initial.shape[1]
     points, states = zeros(n, arrays.POINT), zeros(n, arrays.STATE)
     for number, quantity in enumerate(soils.QUANTITIES):
         holder = points if number < 4 else states
         holder[quantity.name] = initial[number]
-    states["number"] = np.arange(n)
-    states["kind"] = [kinds[name.rpartition(".")[0]] for name in elements.names]
-    groups = math.ceil(n / arrays.GROUP)
+    states["number"] = chosen
+    states["kind"] = [kinds[name.rpartition(".")[0]] for name in names]
+    groups = max(1, math.ceil(n / arrays.GROUP))
     room = n + 128
     bodies = len(model.bodies) + len(model.segments) + 1
     spacing, controls = tables[0].spacing, zeros(1, arrays.CONTROLS)
     one = controls[0]
-    kinds_of = kind_records(model, elements.constants[0][np.searchsorted(states["kind"], np.arange(len(tables)))])
+    of_tables = np.array([kinds[name.rpartition(".")[0]] for name in elements.names])
+    kinds_of = kind_records(model, elements.constants[0][np.searchsorted(of_tables, np.arange(len(tables)))])
     one.volume = kinds_of["volume"][0]
     one.area = one.volume / soils.depth_of_scene(model)
     one.smoothing = soils.SMOOTHING * spacing

@@ -11,6 +11,7 @@ presses as it should.
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
@@ -203,6 +204,24 @@ def begin(soils: Any) -> None:
     soils.kinds["settled"] = 0.0
 
 
+def lifts_of(model: Model) -> int:
+    """Return in how many lifts soil is filled in."""
+    return max(table.lifts for table in model.soils)
+
+
+def in_lifts(model: Model, count: int) -> tuple[system.Elements, system.Indices]:
+    """Return the particles with the stresses of the first so many lifts alone, and the numbers of those in them."""
+    whole, corners = elements_of(model), [table.corners for table in model.soils]
+    low, high = min(one[:, 1].min() for one in corners), max(one[:, 1].max() for one in corners)
+    level = low + count / lifts_of(model) * (high - low)
+    start, kinds = whole.start.copy(), np.array([name.rpartition(".")[0] for name in whole.names])
+    for table in model.soils:
+        own = kinds == table.name
+        above = np.stack([start[0, own], np.full(np.count_nonzero(own), level)], axis=-1)
+        start[4:8, own] -= geostatic_stress(model.scenario, table, above)
+    return replace(whole, start=start), np.flatnonzero(start[1] <= level)
+
+
 def parts_of(track: system.Track) -> dict[str, system.Indices]:
     """Return the numbers of the particles of each soil; they are called SOIL.NUMBER."""
     owners = np.array([name.rpartition(".")[0] for name in track.names])
@@ -349,7 +368,7 @@ def elements_of(model: Model) -> system.Elements:
 
 def _state(soils: Any, count: int) -> system.Floats:
     number = soils.states["number"]
-    values: system.Floats = np.empty((len(QUANTITIES), count))
+    values: system.Floats = np.full((len(QUANTITIES), count), np.nan)  # of those that are not filled in yet
     for row, quantity in enumerate(QUANTITIES):
         holder = soils.points if row < 4 else soils.states
         values[row, number] = holder[quantity.name]
@@ -394,7 +413,9 @@ SOILS = system.System(
     build=lambda model: soil_kernels().build_soils(model),
     largest_step=_largest_step,
     stages=lambda: soil_kernels().STAGES,
-    relaxation=system.Relaxation(kinetic_energy, mean_unrest, halt, begin),
+    relaxation=system.Relaxation(
+        kinetic_energy, mean_unrest, halt, begin, lifts_of, lambda *args: soil_kernels().with_lift(*args)
+    ),
     cost=COST,
     dearer=lambda model: max(GRADIENT_COST[table.gradient] for table in model.soils),
     parts=lambda model: tuple(table.name for table in model.soils),

@@ -96,6 +96,9 @@ class Relaxation(NamedTuple):
     unrest: Callable[[Any, Any], float]  # mean force that is not balanced over the mean weight, given the world too
     halt: Callable[[Any], None]  # takes all velocities away, and books what they held as a loss
     begin: Callable[[Any], None]  # begins its books anew, at rest
+    lifts: Callable[[Model], int]  # in how many it is filled in
+    with_lift: Callable[[Model, Any, int], Any]
+    # arrays of its first lifts, so many, given those of one fewer, or None; what these hold goes on
 
 
 @dataclass(frozen=True)
