@@ -79,7 +79,7 @@ def kind_records(model: Model) -> Any:
         record.volume = table.spacing**2 * depth
         record.mass = material.density * record.volume
         record.lame, record.shear, record.bulk = lame, shear, lame + 2.0 * shear / 3.0
-        record.slope, record.cohesion = soils.yield_surface(material)
+        record.slope, record.cohesion = soils.yield_surface(material, scenario.strength.divisor("soil"))
         record.impedance = material.density * soils.wave_speed(material)
         record.settling, record.settled = soils.damping_at_start(scenario, table)
         record.is_corrected = table.gradient == "corrected"
