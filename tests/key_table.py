@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from blocksim.scenario.models import actuators, contact, geometry, loads, motion, scenario, study, timeline
+from blocksim.scenario.models import actuators, contact, geometry, gravity, loads, motion, scenario, study, timeline
 from blocksim.scenario.models.base import HELD, SYSTEMS
 from blocksim.scenario.overrides import options, si_unit
 from blocksim.scenario.structures import KINDS
@@ -21,6 +21,7 @@ from tests.verification.reference import with_part
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"
 HEAD = "| key | unit | default | meaning |\n| --- | --- | --- | --- |"
+SPELT = {contact.Friction, contact.Pair, contact.Strength, study.Sweep}  # whose tables and lists have rows here
 SHARED = (Structure, loads.Load, timeline.Time, timeline.Probe)
 """What kinds of a table have in common, listed once."""
 
@@ -29,6 +30,7 @@ def key_table() -> str:
     """Return all keys as a Markdown table: key, SI unit, default, meaning."""
     sections: list[tuple[str, type[BaseModel]]] = [
         ("", scenario.Scenario),
+        ("gravity", gravity.GravityField),
         ("materials.NAME", geometry.Material),
         ("blocks.NAME", geometry.Block),
         ("structures, every kind", Structure),
@@ -50,6 +52,7 @@ def key_table() -> str:
         ("friction", contact.Friction),
         ("friction.PAIR", contact.PairFriction),
         ("pairs.A.B", contact.Pair),
+        ("strength", contact.Strength),
         ("contact", contact.Contact),
         ("contact.restitution", contact.Restitution),
         ("time", timeline.Time),
@@ -71,7 +74,7 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     for name, info in model.model_fields.items():
         if name in {"kind", *shared} or info.alias == HELD:
             continue
-        if _is_table(info) and name != "provenance" and model not in {contact.Friction, contact.Pair, study.Sweep}:
+        if _is_table(info) and name != "provenance" and model not in SPELT:
             continue  # it has rows of its own
         key = f"{place}.{info.alias or name}" if place else (info.alias or name)
         if model is study.Sweep and name == "vary":

@@ -13,6 +13,8 @@ def decades(low: int, high: int) -> st.SearchStrategy[float]:
 
 FRACTION = st.floats(0, 1)
 ANGLE = st.floats(-1.5, 1.5).map(lambda angle: f"{angle!r} rad")
+LIGHTER = st.floats(-1, 1, exclude_min=True, exclude_max=True)
+PARTS = st.lists(st.sampled_from(["soil", "joints"]), min_size=1, unique=True)
 FRICTIONS = st.one_of(
     st.floats(0, 5),
     st.floats(0, 89).map(lambda angle: f"{angle!r} deg"),
@@ -100,7 +102,11 @@ def scenarios() -> st.SearchStrategy[Data]:
         },
         optional={
             "description": TEXT,
-            "gravity": st.floats(0, 100),
+            "gravity": st.floats(0, 100)
+            | st.fixed_dictionaries(
+                {}, optional={"magnitude": st.floats(0, 100), "horizontal": st.floats(-2, 2), "vertical": LIGHTER}
+            ),
+            "strength": st.fixed_dictionaries({}, optional={"factor": st.floats(0.1, 10), "of": PARTS}),
             "ground": st.fixed_dictionaries({"tilt": ANGLE}, optional={"profile": PROFILES}),
             "walls": st.lists(WALLS, max_size=2),
             "pairs": st.fixed_dictionaries(

@@ -104,6 +104,8 @@ def _summary(model: Model, description: describe.Description) -> Iterator[str]:
         yield f"sag        {sag}: numerical, proportional to step squared"
         if rigid.warning:
             yield f"warning: {rigid.warning}"
+    if scenario.strength.factor != 1.0:
+        yield f"strength   {' and '.join(scenario.strength.of)} divided by {scenario.strength.factor:g}"
     yield from _unscaled(scenario, description.bodies)
     yield from _statics(model)
     until_rest = ", less if it stops at rest" if scenario.time.stop_at_rest else ""
@@ -178,7 +180,7 @@ def _statics(model: Model) -> Iterator[str]:
 
 def _unscaled(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:
     """Yield which defaults of speeds and times the scenario leaves, where its blocks are far from centimetres."""
-    speed = math.sqrt(scenario.gravity * placement.smallest_width(body for body in placed if not body.fixed))
+    speed = math.sqrt(scenario.gravity.size * placement.smallest_width(body for body in placed if not body.fixed))
     if not 0.0 < speed < math.inf or 1.0 / FAR_APART < speed / USUAL_SPEED < FAR_APART:
         return
     tables = {"time": scenario.time}

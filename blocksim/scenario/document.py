@@ -402,7 +402,7 @@ def load_scenario(
     must lie below its folder or below the current one, unless `allow_outside` is given or an override names them.
     Raises ScenarioError with all mistakes together, and InputMissingError where the file itself cannot be read.
 
-    >>> load("scenarios/slide.toml", {"gravity": "1.62 m/s^2"}).gravity
+    >>> load("scenarios/slide.toml", {"gravity": "1.62 m/s^2"}).gravity.magnitude
     1.62
     """
     document = document_of(source)

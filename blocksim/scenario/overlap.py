@@ -306,7 +306,7 @@ def _spread(labels: Integers, one: Integers, other: Integers) -> Integers:
 
 def support_warning(scenario: Scenario, placed: Sequence[placement.PlacedBody]) -> str:
     """Return a warning of blocks that fall at the start as they touch nothing below them; empty if there are none."""
-    if not scenario.gravity or not placed:
+    if not scenario.gravity.size or not placed:
         return ""
     loose, gap = unsupported(scenario, placed, TOUCHING * placement.smallest_width(placed))
     if not loose:

@@ -251,7 +251,7 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
 
     Missing tables on the way are created. A bare friction c becomes { static = c }, whose kinetic part
     follows the static one until it is set, by itself or by its ratio, of which the later one holds; the friction of a
-    pair of materials starts as that of all pairs; a bare restitution becomes a table of both.
+    pair of materials starts as that of all pairs; a bare restitution becomes a table of both, gravity its magnitude.
     """
     try:
         parts = parse_key(key) if isinstance(key, str) else tuple(key)
@@ -313,6 +313,8 @@ def _opened(data: Data, path: KeyPath, child: object, following: str) -> object:
     is_bare = child is not MISSING and not isinstance(child, Mapping | tuple | list)
     if path == ("contact", "restitution") and is_bare:
         return {"block_block": child, "block_ground": child}
+    if path == ("gravity",) and is_bare:
+        return {"magnitude": child}
     is_of_pair = path[0] == "pairs" and path[3:] == ("friction",)
     if is_of_pair or (path[:-1] == ("friction",) and path[-1] in contact.Friction.model_fields):
         if child is MISSING:

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from blocksim.scenario import overrides as keys, units
 from blocksim.scenario.models import base, geometry, motion, study, timeline
 from blocksim.scenario.models.contact import GROUND, Friction, PairFriction
+from blocksim.scenario.models.gravity import GravityField
 from blocksim.scenario.models.scenario import Scenario
 
 DEFAULT = "default"
@@ -23,8 +24,9 @@ MATERIALS = "materials"
 class ResolvedPair:
     """Contact parameters of two materials, SI; None where they follow from the materials, or from normal damping.
 
-    `normal_stiffness` is as given, not yet times contact.stiffness_scale. `rules` has for every field the key that
-    set it, "default" where none is given, "materials" where it follows from Young's moduli and Poisson's ratios.
+    `friction` is over the factor of [strength], `normal_stiffness` not yet times contact.stiffness_scale. `rules` has
+    for every field the key that set it, "default" where none is given, "materials" where it follows from Young's moduli
+    and Poisson's ratios.
     """
 
     friction: PairFriction
@@ -64,6 +66,7 @@ def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> R
     for quantity, usual in general.items():
         special = ((getattr(pair, quantity), f"{key}.{quantity}") for key, pair in overrides)
         values[quantity], rules[quantity] = next((one for one in special if one[0] is not None), usual)
+    values["friction"] = values["friction"].over(scenario.strength.divisor("joints"))
     return ResolvedPair(**values, rules=rules)
 
 
@@ -119,6 +122,8 @@ def deciding_values(scenario: Scenario, include: set[str] | None = None) -> dict
     data = scenario.model_dump(mode="json", include=include, exclude=UNHASHED)
     if "start" in data and not scenario.systems:  # nothing that settles unasked
         data["start"]["settle"] = bool(scenario.start.settle)
+    if data.get("strength", {}).get("factor") == 1.0:  # divides nothing
+        del data["strength"]
     if "motion" in data and isinstance(scenario.motion, motion.TABLED):
         data["motion"]["table"] = scenario.motion.table.digest
     for number, table in tables_of_bodies(scenario).items() if "bodies" in data else ():
@@ -151,8 +156,8 @@ def _plain(table: object) -> Any:
             return [_plain(entry) for entry in table]
         case Path() | motion.MotionTable():
             return (table if isinstance(table, Path) else table.path).as_posix()
-    if not isinstance(table, BaseModel):
-        return table
+    if not isinstance(table, BaseModel) or isinstance(table, GravityField):
+        return table.model_dump() if isinstance(table, GravityField) else table
     entries: dict[str, Any] = {}
     for name, info in type(table).model_fields.items():
         value = getattr(table, name)

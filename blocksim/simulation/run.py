@@ -70,7 +70,7 @@ def _onset_warnings(model: Model, world: arrays.World, settled: results.RestStat
     for body, one in zip(world.bodies[:-1], model.bodies, strict=True):  # those that slip on the ground
         values = world.interactions[int(body["contact_class"]), ground]
         stiffness = 2.0 * float(values["normal_stiffness"] * values["shear_ratio"])
-        limit = float(values["kinetic_friction"]) * scenario.gravity
+        limit = float(values["kinetic_friction"]) * scenario.gravity.size
         if stiffness > 0.0 and limit < pulse.amplitude and not one.fixed:
             gained = 0.5 * pulse.amplitude * math.sqrt(one.mass / stiffness)  # a/w
             errors.append((gained / mean_slip_rate(model, limit), one.name))

@@ -56,7 +56,7 @@ class Blockwork(NamedTuple):
             _friction(layout, assembly),
             np.array([body.mass for body in blocks]),
             forces,
-            scenario.gravity,
+            scenario.gravity.magnitude,
             scenario.ground.tilt,
             0.5 * float(np.hypot(*np.subtract(high, low))),
         )

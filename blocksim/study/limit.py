@@ -77,7 +77,7 @@ BEYOND = 10.0 / 9.0  # of the way to stiff contacts over that to springs ten tim
 FAR = 0.08  # of a limit: two of them that are no farther apart are extrapolated
 AIM = 0.07  # of the way to the next limit, by which that may be elsewhere
 TILT = "ground.tilt"
-COEFFICIENTS = ("friction.", ".friction")
+COEFFICIENTS = ("friction.", ".friction", "gravity.horizontal")
 STIFFNESS = "contact.stiffness_scale"
 OF_STIFFNESS = ("stiffness", "young_modulus", "poisson_ratio", "contact_radius", "time.")
 
@@ -251,7 +251,7 @@ class StandingSide:
         if self.give is not None:
             return max(self.give.share, 2.0 * math.radians(self.give.turn) / slender)
         # the softest contact gives way under the weight of all free blocks
-        weight = scenario.gravity * sum(body.mass for body in placed if not body.fixed)
+        weight = scenario.gravity.size * sum(body.mass for body in placed if not body.fixed)
         table = interactions_of(scenario, contact_classes(self.model))
         springs = (pair for row in table for pair in row if pair.normal_stiffness > 0.0)
         stiffness = min(pair.normal_stiffness * min(1.0, pair.shear_ratio) for pair in springs)  # in shear if softer
@@ -274,7 +274,7 @@ class StandingSide:
                 load = min(abs(float(scenario.ground.tilt)), 1.0) or 1.0
             elif is_coefficient and not plan.unit:
                 load = min(abs(self.value), 1.0) or 1.0
-            rest = rest / scenario.gravity / load
+            rest = rest / scenario.gravity.magnitude / load
         if as_given or not plan.model.scenario.time.has_springs:
             return limit_answer.Margin(rest=rest, springs=0.0)
         if levels is not None:
@@ -301,7 +301,7 @@ def rest_acceleration(model: Model, least_moved: float | None) -> float:
     Zero where blocks settle before time zero, supports move, or nothing pulls.
     """
     scenario, time = model.scenario, model.scenario.time
-    if model.settles or scenario.motion is not None or not scenario.gravity > 0.0:
+    if model.settles or scenario.motion is not None or not scenario.gravity.size > 0.0:
         return 0.0
     moved = observables.MOVED_SHARE * placement.smallest_width(body for body in model.bodies if not body.fixed)
     way = moved if least_moved is None else least_moved

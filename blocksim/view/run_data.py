@@ -229,7 +229,7 @@ def support_of(
         direction=motion_direction(scenario),
         motion=None if scenario.motion is None else model.motion,
         loads=loads,
-        weight=scenario.gravity * sum(body.mass for body in placed if not body.fixed or body.freed),
+        weight=scenario.gravity.size * sum(body.mass for body in placed if not body.fixed or body.freed),
     )
 
 

@@ -378,6 +378,7 @@ def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
     rows = []
     for layout, (step, skin, approach) in zip(parts.layouts, strides, strict=True):
         scenario, contact, time = layout.scenario, layout.scenario.contact, layout.scenario.time
+        pull_x, pull_y = scenario.gravity.pull(scenario.ground.tilt)
         motion_x, motion_y = (0.0, 0.0) if scenario.motion is None else motion.motion_direction(scenario)
         kernel, smoothing_length = KERNEL_CODES[contact.kernel], contact.resolved_smoothing_length
         hold = min(time.rest_hold or math.inf, LONGEST_HOLD * time.end)
@@ -392,8 +393,8 @@ def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
             "step": step,
             "skin": skin,
             "approach": approach,
-            "gravity_x": -scenario.gravity * math.sin(scenario.ground.tilt),
-            "gravity_y": -scenario.gravity * math.cos(scenario.ground.tilt),
+            "gravity_x": pull_x,
+            "gravity_y": pull_y,
             "motion_x": motion_x,
             "motion_y": motion_y,
             "max_overlap": 0.0 if contact.max_overlap is None else contact.max_overlap,

@@ -139,7 +139,7 @@ def describe(model: Model) -> Description:
     rigid = None
     if has_rigid:
         reason = rigid_step.reason_of_step(layout, bounds, speeds)
-        sag = scene_sag(step / scenario.time.parts, layout.placed, scenario.gravity)
+        sag = scene_sag(step / scenario.time.parts, layout.placed, scenario.gravity.size)
         rigid = SagDescription(
             why=reason.text.format(*reason.numbers),
             substeps=scenario.time.parts,
@@ -147,7 +147,7 @@ def describe(model: Model) -> Description:
             free=bounds.free,
             tolerance=nonsmooth.velocity_tolerance(scenario, count),
             velocity_sweeps=nonsmooth.stepping_of(scenario).velocity_sweeps,
-            fall=scenario.gravity * step / scenario.time.parts,
+            fall=scenario.gravity.size * step / scenario.time.parts,
             longest_step=rigid_step.longest_step(layout, bounds, speeds),
             sag=sag.sag,
             block=sag.block,

@@ -76,13 +76,15 @@ def _fields(
 
     That is what it gives a point of a body (m/s2) beyond gravity of its usual size, with a factor of `largest`.
     """
-    load, tilt = acting.load, scenario.ground.tilt
-    if isinstance(load, loads.Gravity):  # it turns, and gets no larger
-        return {"kind": arrays.LOAD_TILT, "fx": scenario.gravity}, 0.0
+    load, tilt, gravity = acting.load, scenario.ground.tilt, scenario.gravity.magnitude
+    if isinstance(load, loads.Gravity):  # its magnitude turns; both together get larger by twice the coefficients
+        kept_x, kept_y = gravity * scenario.gravity.horizontal, gravity * scenario.gravity.vertical
+        fields = {"kind": arrays.LOAD_TILT, "fx": gravity, "base_x": kept_x, "base_y": kept_y}
+        return fields, 2.0 * math.hypot(kept_x, kept_y)
     if isinstance(load, loads.Horizontal):
-        size = load.magnitude * scenario.gravity
+        size = load.magnitude * gravity
         fields = {"kind": arrays.LOAD_FIELD, "fx": size * math.cos(tilt), "fy": -size * math.sin(tilt)}
-        return fields, largest * abs(load.magnitude) * scenario.gravity
+        return fields, largest * abs(load.magnitude) * gravity
     body = placed[acting.body]
     radius = body.radius
     if isinstance(load, loads.Moment):

@@ -180,7 +180,7 @@ def _rates(arms: Floats, ways: Floats) -> Floats:
 def applied_forces(layout: Layout, blocks: Sequence[int]) -> Floats:
     """Return forces (N) and moments (N m) on blocks, (n, 3): weight, and loads as they are at the start."""
     scenario = layout.scenario
-    tilt, gravity = scenario.ground.tilt, scenario.gravity
+    tilt = scenario.ground.tilt
     forces = np.zeros((len(blocks), 3))
     place = {body: k for k, body in enumerate(blocks)}
     push = np.zeros(2)
@@ -201,7 +201,7 @@ def applied_forces(layout: Layout, blocks: Sequence[int]) -> Floats:
             fx, fy = (c * load.fx - s * load.fy, s * load.fx + c * load.fy) if load.turns else (load.fx, load.fy)
             forces[place[load.body]] += size * np.array([fx, fy, x * fy - y * fx + load.torque])
     masses = np.array([layout.placed[i].mass for i in blocks])
-    forces[:, :2] += np.outer(masses, push - gravity * np.array([math.sin(tilt), math.cos(tilt)]))
+    forces[:, :2] += np.outer(masses, push + scenario.gravity.pull(tilt))
     return forces
 
 

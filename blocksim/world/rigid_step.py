@@ -256,10 +256,10 @@ def reason_of_step(layout: Layout, bounds: Bounds, speeds: Speeds) -> Reason:
     if frequency > 0.0:
         why = "the stiffest actuator swings with its body alone at {:.3g} Hz"
         reasons.append(Reason(excitation.STIFF * scenario.time.parts / frequency, why, (frequency / (2.0 * math.pi),)))
-    if bounds.free and scenario.gravity > 0.0:
+    if bounds.free and scenario.gravity.size > 0.0:
         share = 0.02 * bounds.free / FEW  # of sqrt(L/g): the step of so many
         why = "{:.2g} √(L/g) for so few blocks, L = {:.4g} mm the smallest side"
-        parts = max(1, round(USUAL_STEP / (share * math.sqrt(bounds.smallest / scenario.gravity))))
+        parts = max(1, round(USUAL_STEP / (share * math.sqrt(bounds.smallest / scenario.gravity.size))))
         reasons.append(Reason(USUAL_STEP / parts, why, (share, MILLI * bounds.smallest)))
         if bounds.free < CROWD:  # which takes the usual step anyway
             reasons += _reasons_of_sag(layout, bounds)
@@ -272,7 +272,7 @@ def _reasons_of_sag(layout: Layout, bounds: Bounds) -> Iterator[Reason]:
 
     Most scenes are far from it, which is known from the weight of all.
     """
-    gravity, substep = layout.scenario.gravity, USUAL_STEP / layout.scenario.time.parts
+    gravity, substep = layout.scenario.gravity.size, USUAL_STEP / layout.scenario.time.parts
     masses = [1.0 / kind.inverse_mass for kind in bounds.kinds if kind.inverse_mass > 0.0]
     crushed = CALM * CRUSHED_SHARE * bounds.smallest
     allowed = CALM * WARNING_SHARE * bounds.smallest

@@ -146,7 +146,7 @@ def soft_base(scenario: Scenario, placed: Sequence[PlacedBody], world: World) ->
         return None
     found = [
         (load.force / float(values[classes[load.upper], classes[-1 if load.lower is None else load.lower]]), load)
-        for load in loads_at_rest(placed, scenario.gravity)
+        for load in loads_at_rest(placed, scenario.gravity.size)
     ]
     overlap, load = max(found, key=lambda one: one[0], default=(0.0, None))
     if load is None or not overlap > 0.0:

@@ -190,14 +190,15 @@ def speeds_of(layout: Layout, bounds: Bounds) -> Speeds:
         given = max(given, math.hypot(one.vx or 0.0, one.vy or 0.0) + 0.5 * size * abs(one.spin or 0.0))
     lowest = min((y for _, y in scenario.ground.profile or ()), default=0.0)
     height = max(0.0, bounds.top + rise - lowest)
-    fall = math.sqrt(2.0 * scenario.gravity * math.cos(scenario.ground.tilt) * height)
+    gravity, horizontal, vertical = (value for _, value in scenario.gravity)
+    fall = math.sqrt(2.0 * gravity * max(0.0, math.cos(scenario.ground.tilt) - vertical) * height)
     # least friction of free blocks on supports and fixed ones: on one another they slide no farther than their length
     free = {kind.contact_class for kind in bounds.kinds if kind.inverse_mass > 0.0}
     fixed = {kind.contact_class for kind in bounds.kinds if not kind.inverse_mass > 0.0}
     pairs = product({*fixed, *bounds.grounds}, free)
     friction = min((layout.interactions[i][j].kinetic_friction for i, j in pairs), default=math.inf)
-    held = friction * math.cos(tilt)
-    slope, push = scenario.gravity * (math.sin(tilt) - held), layout.applied.push
+    held = friction * max(0.0, math.cos(tilt) - vertical)
+    slope, push = gravity * (math.sin(tilt) + abs(horizontal) - held), layout.applied.push
     slide = max(0.0, slope + push) * scenario.time.end
     if push > 0.0 and scenario.time.has_springs:  # rigid contacts sink in under loads, with the square of the step
         slide = min(slide, max(0.0, slope) * scenario.time.end + math.sqrt(2.0 * push * _extent_of(layout)))
@@ -293,9 +294,10 @@ def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: law
 def expected_load(layout: Layout, bounds: Bounds, speeds: Speeds) -> ContactLoad:
     """Return the speed that the fastest point may reach by falling, or by sliding all the time, and the weight."""
     scenario, push = layout.scenario, layout.applied.push
-    along = scenario.gravity * math.sin(excitation.steepest_tilt(scenario)) + push
+    gravity = scenario.gravity
+    along = gravity.magnitude * (math.sin(excitation.steepest_tilt(scenario)) + abs(gravity.horizontal)) + push
     speed = speeds.given + speeds.fall + along * scenario.time.end
-    return ContactLoad(speed, (scenario.gravity + push) * bounds.mass)
+    return ContactLoad(speed, (gravity.size + push) * bounds.mass)
 
 
 def step_of_contacts(layout: Layout, bounds: Bounds, speeds: Speeds) -> float:

@@ -201,7 +201,7 @@ def accelerations(result: Result) -> NDArray[np.float64]:
         fx, fy = sign * forces[here].T
         rx, ry = rows["x"] - frames.x[frame, body], rows["y"] - frames.y[frame, body]
         np.add.at(total, (frame, body), np.stack([fx, fy, rx * fy - ry * fx], axis=-1))
-    return np.asarray(total / inertia - [0.0, result.scenario.gravity, 0.0])
+    return np.asarray(total / inertia - [0.0, result.scenario.gravity.magnitude, 0.0])
 
 
 def all_push(result: Result) -> NDArray[np.bool_]:
@@ -258,7 +258,7 @@ def test_contacts_of_blocks_at_rest_hold_their_weight_and_are_counted(soft: Ship
     contacts, placed, tilt = result.frames.contacts, Model(result.scenario).bodies, result.scenario.ground.tilt
     assert contacts is not None
     assert result.reason == "at rest"
-    weight = sum(body.mass for body in placed if not body.fixed) * result.scenario.gravity
+    weight = sum(body.mass for body in placed if not body.fixed) * result.scenario.gravity.magnitude
     fixed = [body.fixed for body in placed]
     held = force_on_supports(contacts, (float(np.sin(tilt)), float(np.cos(tilt))), fixed)
     assert held[-1] == pytest.approx(weight, rel=1e-6)

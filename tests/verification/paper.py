@@ -135,7 +135,7 @@ def bounce_law(result: results.Result) -> LawCurve:
     The second form of Eq. 10 as printed gives the remaining rise: the height is the apex of Eq. 12 less that, 0 after
     the last bounce.
     """
-    frames, gravity = result.frames, result.scenario.gravity
+    frames, gravity = result.frames, result.scenario.gravity.magnitude
     clearance = frames.y[:, 0] - 0.5 * frames.size_y[0]
     start, restitution = float(clearance[0]), result.scenario.contact.restitution.block_ground
     impacts = [sqrt(2.0 * start / gravity)]
@@ -162,7 +162,7 @@ def bounces(result: results.Result) -> list[Bounce]:
     In free flight height and speed of any frame give the apex and the instant of landing; the simulated flight time is
     that between two landings, the time in contact included.
     """
-    frames, gravity = result.frames, result.scenario.gravity
+    frames, gravity = result.frames, result.scenario.gravity.magnitude
     clearance, speed = frames.y[:, 0] - 0.5 * frames.size_y[0], frames.vy[:, 0]
     restitution, start = result.scenario.contact.restitution.block_ground, float(clearance[0])
     turns = np.flatnonzero((speed[:-1] < 0.0) & (speed[1:] > 0.0)) + 1
@@ -190,7 +190,7 @@ def bounces(result: results.Result) -> list[Bounce]:
 
 def slide_law(result: results.Result) -> LawCurve:
     """Return the speed (mm/s) of a sliding block, and Eq. 13 with the ground's friction."""
-    frames, gravity = result.frames, result.scenario.gravity
+    frames, gravity = result.frames, result.scenario.gravity.magnitude
     friction, start = result.scenario.friction.block_ground.kinetic, float(frames.vx[0, 0])
     expected = np.array([sliding_speed(float(time), start, friction, gravity) for time in frames.time])
     marks = [forms.sliding_stop_time(start, friction, gravity)]
@@ -218,7 +218,7 @@ def properties_table(printed: Mapping[str, float], scenario: Scenario) -> str:
     overlaps = [overlap for one in scenario.structures if (overlap := getattr(one, "overlap", None)) is not None]
     used = {name: float(getattr(block, name)) for name in ("width", "height", "length")} | {
         "overlap": overlaps[0] if overlaps else float("nan"),
-        "unit_weight": material.density * scenario.gravity,
+        "unit_weight": material.density * scenario.gravity.magnitude,
         "young_modulus": material.young_modulus,
         "poisson_ratio": material.poisson_ratio,
         "friction_block_block": scenario.friction.block_block.static,

@@ -254,7 +254,7 @@ LOAD = record_type(
     "fx fy torque "  # N, N, N m for a value of one; of accelerations m/s2; of a face m of depth times its inward normal
     "unit_weight "  # N/m2: of water, times the length of the face
     "up_x up_y "  # -: against gravity as it is at the start
-    "base_x base_y "  # m: where its point was at time zero
+    "base_x base_y "  # m: where its point was at time zero; of gravity m/s2: the part that does not turn
     "stiffness damping least most "  # N/m, N s/m, N, N: of an actuator, and between what its force is
     "fastest "  # m/s: greatest rate of its head
     "work "  # J: that of an actuator on its body

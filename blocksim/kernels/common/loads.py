@@ -58,7 +58,8 @@ def acceleration_at(world: arrays.World, load: arrays.Record, time: float) -> tu
     value = value_at(world, load, time)
     if load.kind == arrays.LOAD_TILT:
         controls = world.controls[0]
-        return -load.fx * math.sin(value) - controls.gravity_x, -load.fx * math.cos(value) - controls.gravity_y
+        x, y = load.base_x - load.fx * math.sin(value), load.base_y - load.fx * math.cos(value)
+        return x - controls.gravity_x, y - controls.gravity_y
     return value * load.fx, value * load.fy
 
 

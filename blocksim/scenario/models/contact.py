@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import ConfigDict, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -26,7 +26,7 @@ GROUND = "ground"
 """Stands for the ground where pairs name materials; no material can have this name."""
 
 
-class _Short(Table):
+class Short(Table):
     """A table in whose place a bare value may stand in the file."""
 
     bare: ClassVar[JsonSchemaValue]
@@ -37,7 +37,7 @@ class _Short(Table):
         return {"anyOf": [cls.bare, handler(schema)]}
 
 
-class PairFriction(_Short):
+class PairFriction(Short):
     """Coulomb friction of one material pair, falling from static to kinetic with the sliding speed.
 
     mu(v) = kinetic + (static - kinetic) exp(-|v| / transition_speed). A bare number or friction angle in the
@@ -69,6 +69,11 @@ class PairFriction(_Short):
         if self.kinetic > self.static:
             raise q.invalid(f"kinetic friction {self.kinetic:g} is above static friction {self.static:g}", "kinetic")
 
+    def over(self, divisor: float) -> Self:
+        """Return the same with both coefficients divided, at most to no slip."""
+        less = {name: min(getattr(self, name) / divisor, q.NO_SLIP) for name in ("static", "kinetic")}
+        return self.model_copy(update=less)
+
 
 class Friction(Table):
     """Friction between blocks, and between blocks and the ground; the defaults are the paper's."""
@@ -77,7 +82,28 @@ class Friction(Table):
     block_ground: PairFriction = setting("friction between a block and the ground", PairFriction(static=0.38))
 
 
-class Restitution(_Short):
+PARTS = ("soil", "joints")
+
+
+class Strength(Table):
+    """A factor by which strength is divided: `limit` over it gives the factor of safety by strength reduction."""
+
+    factor: q.PositiveNumber = setting("divides tan(friction_angle) and cohesion of soils, and friction of joints", 1.0)
+    of: tuple[Annotated[Literal["soil", "joints"], OneOf(PARTS)], ...] = setting(
+        "what is divided: soil, joints (between blocks, ground, walls and soil, static and kinetic alike), or both",
+        PARTS,
+    )
+
+    def _check(self) -> None:
+        if not self.of or len({*self.of}) < len(self.of):
+            raise q.invalid('name soil, joints or both once, such as of = ["soil", "joints"]', "of")
+
+    def divisor(self, part: str) -> float:
+        """Return the factor for one of PARTS."""
+        return self.factor if part in self.of else 1.0
+
+
+class Restitution(Short):
     """Coefficients of restitution; a bare number in the file sets both."""
 
     bare: ClassVar = {"type": "number", "minimum": 0, "maximum": 1}

@@ -11,8 +11,9 @@ from blocksim.notebook import Shown
 from blocksim.scenario import units as q
 from blocksim.scenario.models.actuators import Actuator, stretches_of
 from blocksim.scenario.models.base import HELD, SYSTEMS, Identifier, OneOf, SystemTable, Table, read_tables, setting
-from blocksim.scenario.models.contact import Contact, Friction, Pair
+from blocksim.scenario.models.contact import Contact, Friction, Pair, Strength
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
+from blocksim.scenario.models.gravity import GravityField
 from blocksim.scenario.models.loads import AnyLoad
 from blocksim.scenario.models.motion import AnyMotion
 from blocksim.scenario.models.study import Experiment, Sweep
@@ -32,7 +33,7 @@ class Scenario(Shown, Table):
     schema_version: Annotated[Literal[1], OneOf((1,))] = setting("version of the file format", alias="schema")
     name: Identifier = setting("name of the scenario and of its results folder")
     description: str = setting("free text", "")
-    gravity: q.NonNegativeAcceleration = setting("acceleration of gravity", q.USUAL_GRAVITY)
+    gravity: Annotated[GravityField, q.ACCELERATION] = setting("gravity and its coefficients", GravityField())
     materials: dict[Identifier, Material] = setting("materials by name, as in [materials.aluminium]")
     blocks: dict[Identifier, Block] = setting("blocks by name, as in [blocks.brick]", {})
     structures: tuple[AnyStructure, ...] = setting("generators of bodies", ())
@@ -46,6 +47,7 @@ class Scenario(Shown, Table):
     start: Start = setting("what happens before time zero", Start())
     friction: Friction = setting("friction between blocks and with the ground", Friction())
     pairs: dict[str, dict[str, Pair]] = setting("pairs of materials that differ, as in [pairs.aluminium.ground]", {})
+    strength: Strength = setting("factor by which strength is divided", Strength())
     contact: Contact = setting("contact model and its numbers", Contact())
     time: AnyTime = setting("time stepping", Explicit())
     output: Output = setting("what is recorded", Output())

@@ -105,7 +105,7 @@ def kind_records(model: Model, masses: system.Floats) -> Any:
         counts = geometry.count_across(table.corners, table.spacing)
         record.pitch_x, record.pitch_y = (np.ptp(table.corners, axis=0) - table.spacing) / (np.array(counts) - 1.0)
         record.lame, record.shear, record.bulk = lame, shear, lame + 2.0 * shear / 3.0
-        record.slope, record.cohesion = soils.yield_surface(material)
+        record.slope, record.cohesion = soils.yield_surface(material, scenario.strength.divisor("soil"))
         record.impedance = material.density * soils.wave_speed(material)
         record.settling, record.settled = soils.damping_at_start(scenario, table)
         record.is_corrected = table.gradient == "corrected"

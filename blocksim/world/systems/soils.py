@@ -62,14 +62,16 @@ def wave_speed(material: Material) -> float:
     return math.sqrt((lame + 2.0 * shear) / material.density)
 
 
-def yield_surface(material: Material) -> tuple[float, float]:
-    """Return a (-) and k (Pa) of the surface (J2)^(1/2) + a I1 = k.
+def yield_surface(material: Material, divisor: float = 1.0) -> tuple[float, float]:
+    """Return a (-) and k (Pa) of the surface (J2)^(1/2) + a I1 = k, of tan(phi) and c over a divisor.
 
     mohr-coulomb: a = sin(phi)/3 and k = c cos(phi), which fails as Mohr and Coulomb say where the flow has no dilation
     (kernels/soil/stress.py). plane-strain-associated: tan(phi)/(9 + 12 tan(phi)^2)^(1/2) and 3 c over the same root,
     which does so for an associated flow, and is weaker without dilation: sin(phi) becomes 3 a.
     """
-    angle, cohesion = material.friction_angle or 0.0, material.cohesion or 0.0
+    angle, cohesion = material.friction_angle or 0.0, (material.cohesion or 0.0) / divisor
+    if divisor != 1.0:  # the tangent of an angle and back changes its last digit
+        angle = math.atan(math.tan(angle) / divisor)
     if material.yield_surface == "plane-strain-associated":
         root = math.sqrt(9.0 + 12.0 * math.tan(angle) ** 2)
         return math.tan(angle) / root, 3.0 * cohesion / root
@@ -77,7 +79,7 @@ def yield_surface(material: Material) -> tuple[float, float]:
 
 
 def earth_pressure_at_rest(material: Material) -> float:
-    """Return horizontal over vertical stress: of elasticity, or the least one within the yield surface."""
+    """Return horizontal over vertical stress: of elasticity, or the least one within the surface of full strength."""
     poisson = material.poisson_ratio
     slope = math.sqrt(3.0) * yield_surface(material)[0]
     return max(poisson / (1.0 - poisson), (1.0 - slope) / (1.0 + 2.0 * slope))
@@ -90,7 +92,7 @@ def depth_of_scene(model: Model) -> float:
 
 def damping_at_start(scenario: Scenario, table: SoilTable) -> tuple[float, float]:
     """Return the rate (1/s) of damping at the start, and the time (s) when it ends; none where nothing has weight."""
-    if scenario.gravity == 0.0:
+    if scenario.gravity.size == 0.0:
         return 0.0, 0.0
     material = scenario.materials[table.material]
     smoothing, speed = SMOOTHING * table.spacing, wave_speed(material)
@@ -102,12 +104,14 @@ def damping_at_start(scenario: Scenario, table: SoilTable) -> tuple[float, float
 def friction_with(scenario: Scenario, soil: str, partner: str, *, ground: bool) -> contact.PairFriction:
     """Return the friction of a soil's material with another one; `ground` for the ground (GROUND) and walls.
 
-    As [pairs] has it, else that of the soil itself, as on a rough face: [friction] is about blocks.
+    As [pairs] has it, else that of the soil itself, as on a rough face: [friction] is about blocks. Over the factor of
+    [strength].
     """
     pair = resolve_pair(scenario, soil, partner, ground=ground)
     if pair.rules["friction"].startswith("pairs."):
         return pair.friction
-    return contact.PairFriction(static=math.tan(scenario.materials[soil].friction_angle or 0.0))
+    own = contact.PairFriction(static=math.tan(scenario.materials[soil].friction_angle or 0.0))
+    return own.over(scenario.strength.divisor("joints"))
 
 
 def geostatic_stress(scenario: Scenario, table: SoilTable, places: system.Floats) -> system.Floats:
@@ -119,7 +123,7 @@ def geostatic_stress(scenario: Scenario, table: SoilTable, places: system.Floats
     if table.start == "ramp":
         return stress
     weight = np.zeros(len(places))
-    gravity = scenario.gravity * math.cos(scenario.ground.tilt)
+    gravity = -scenario.gravity.pull(scenario.ground.tilt)[1]
     for other in placement.soil_tables(scenario):
         density = scenario.materials[other.material].density
         weight += density * gravity * geometry.height_above(other.corners, places)
@@ -134,7 +138,10 @@ def known_errors(model: Model) -> Iterator[str]:
     for number, load in enumerate(model.scenario.loads):
         if isinstance(load, loads.Horizontal | loads.Gravity):
             key = overrides.format_key(("loads", load.name or number))
-            yield f"{key}: soil does not feel this load, blocks alone do; ground.tilt turns the gravity of both"
+            both = "ground.tilt turns the gravity of both"
+            if isinstance(load, loads.Horizontal):
+                both = f"gravity = {{ horizontal = {load.magnitude:g} }} pushes both"
+            yield f"{key}: soil does not feel this load, blocks alone do; {both}"
     for soil in model.soils:
         is_rough = friction_with(model.scenario, soil.material, GROUND, ground=True).static > 0.0
         if is_rough and _is_beside_a_block(model.bodies, soil):
