@@ -148,11 +148,10 @@ def _joint_lines(states: Mapping[str, safety.Safety]) -> Iterator[str]:
     if len(pushed) > MOST_BASES:
         yield f"... and {len(pushed) - MOST_BASES} more structures in joints.csv"
     if pushed:
-        yield "  factors of safety mobilised by the forces of the run" + "".join(
-            "; near 1 they are no alarm for a wall\n  at rest: it stands under any thrust from the active one to that "
-            "which overturns it"
-            for _ in range(any(row.active_sliding is not None for _, row in pushed))
-        )
+        yield "  factors of safety mobilised by the forces of the run"
+    if any(row.active_sliding is not None for _, row in pushed):
+        yield "  near 1 they are no alarm for a wall at rest, which stands under any thrust"
+        yield "  from the active one to that which overturns it"
 
 
 def _factor(value: float | None) -> str:

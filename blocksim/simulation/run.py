@@ -19,9 +19,10 @@ from blocksim.options import silent
 from blocksim.scenario import Model, Scenario, events, motion, placement
 from blocksim.scenario.models.motion import Pulse
 from blocksim.scenario.models.timeline import Nonsmooth
-from blocksim.simulation import balance, checkpoint, files, instruments, loop, observables, provenance, results, safety, schemes
+from blocksim.simulation import balance, checkpoint, files, instruments, loop, observables, provenance, results, schemes
 from blocksim.simulation.interruption import WallTime, stop_requests
 from blocksim.simulation.rest_state import initial_scene
+from blocksim.simulation.safety import Safety, safety_of
 from blocksim.simulation.stores.hdf5 import FrameFile
 from blocksim.simulation.trajectory import final_columns
 from blocksim.world import build, free_memory, memory, systems
@@ -175,14 +176,16 @@ def simulate_into(
             else:
                 scene, position = checkpoint.restore_scene(stored, scene), stored.head.position
                 settled, parts = position.settled, (*position.resumed_from, position.step)
-                past = checkpoint.Past(position.total_seconds, parts, stored.path, position.step, settled, position.joints)
+                total, joints = position.total_seconds, position.joints
+                past = checkpoint.Past(total, parts, stored.path, position.step, settled, joints)
                 checkpoint.take_over(stored, model, recorder)
             toml = files.keep_scenario(scenario, tables, folder)
             with FrameFile(folder / files.FRAMES, recorder, toml, schemes.ledger_names(scene)) as sink:
                 recorder.sink = sink
                 del recorder.held[:-1]  # the file has them
                 probes = (f"{files.PROBE}{name}.csv" for name in model.probes)
-                files.clear_remains(folder, (files.FINAL, files.JOINTS, files.SOILS, files.SUMMARY, *probes))  # of the part before
+                remains = (files.FINAL, files.JOINTS, files.SOILS, files.SUMMARY, *probes)
+                files.clear_remains(folder, remains)  # of the part before
                 periods = precautions.periods(recorder.time_step)
                 seconds = precautions.checkpoint_seconds
                 writer = checkpoint.CheckpointWriter(
@@ -236,11 +239,9 @@ def _attended(
         yield recorder, team, control
 
 
-def _settled_joints(
-    model: Model, scene: schemes.AnyScene, settled: results.RestState | None
-) -> dict[str, safety.Safety]:
+def _settled_joints(model: Model, scene: schemes.AnyScene, settled: results.RestState | None) -> dict[str, Safety]:
     """Return the joints across structures that have come to rest before time zero."""
-    return {"settled": safety.safety_of(model, scene)} if settled is not None and settled.at_rest else {}
+    return {"settled": safety_of(model, scene)} if settled is not None and settled.at_rest else {}
 
 
 def _result(
@@ -249,7 +250,7 @@ def _result(
     ended: loop.LoopResult,
     seconds: float,
     settled: results.RestState | None,
-    joints: dict[str, safety.Safety],
+    joints: dict[str, Safety],
 ) -> results.Result:
     scenario, frames = model.scenario, recorder.frames()
     world, step = ended.scene.world, recorder.time_step
@@ -288,7 +289,7 @@ def _result(
         settled=settled,
         events=ended.events,
         movement=movement,
-        joints={**joints, "end": safety.safety_of(model, ended.scene)} if recorder.placed else {},
+        joints={**joints, "end": safety_of(model, ended.scene)} if recorder.placed else {},
         warnings=tuple(_warnings(model, ended, settled)),
         environment=provenance.environment(),
     )

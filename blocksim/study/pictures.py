@@ -281,8 +281,8 @@ class PlotOptions(style.PageOptions):
         str | None,
         Option(
             "Of a run: strip (default), final, history, profile (the surface of soil), motion (of the supports), "
-            "joints (factors of safety), probe or capacity (of actuators). Of a sweep: lines, map (two inputs), matrix (every two inputs) or "
-            "histogram; tornado for sensitivities (default: what suits).",
+            "joints (factors of safety), probe or capacity (of actuators). Of a sweep: lines, map (two inputs), "
+            "matrix (every two inputs) or histogram; tornado for sensitivities (default: what suits).",
             metavar="KIND",
             complete="kinds",
         ),

@@ -6,7 +6,7 @@ tension.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,10 @@ from blocksim.world.systems.system import Floats
 
 STRAIGHT = 0.01  # of the smallest side: how far points may lie off a line
 PLACES = 50  # where the surface is looked at
+
+
+class NotApplicableError(Exception):
+    """Why a structure has no joints, or no active thrust."""
 
 
 def coulomb_share(angle: float, batter: float = 0.0, slope: float = 0.0, friction: float = 0.0) -> float:
@@ -36,9 +40,8 @@ class ActiveThrust(NamedTuple):
     """Soil behind a straight back."""
 
     side: float  # 1.0 where it is on the right
-    low: float  # m: heights between which it lies against the back
-    top: float
-    x: float  # m, of the back at `top`
+    ends: tuple[float, float]  # m: heights between which it lies against the back
+    x: float  # m, of the back at the upper one
     batter: float  # rad
     friction: float  # rad, on the back
     share: float  # K
@@ -47,89 +50,73 @@ class ActiveThrust(NamedTuple):
     depth: float  # m
 
     def above(self, heights: Floats) -> Floats:
-        """Return the thrust above some heights (m): forces (N) along x and y, and moment (N m) about the origin."""
-        foot = np.maximum(heights, self.low)
-        crack = 2.0 * self.cohesion / (self.unit_weight * math.sqrt(self.share))
-        height = np.maximum(self.top - foot - crack, 0.0)
-        size, turned = 0.5 * self.unit_weight * self.share * height**2 * self.depth, self.batter + self.friction
-        y = foot + height / 3.0
-        x = self.x + self.side * math.tan(self.batter) * (self.top - y)
+        """Return the thrust above some heights (m), (k, 3): forces (N) and moment about the origin (N m)."""
+        (low, top), turned = self.ends, self.batter + self.friction
+        foot, crack = np.maximum(heights, low), 2.0 * self.cohesion / (self.unit_weight * math.sqrt(self.share))
+        height = np.maximum(top - foot - crack, 0.0)
+        size, y = 0.5 * self.unit_weight * self.share * height**2 * self.depth, foot + height / 3.0
         fx, fy = -self.side * math.cos(turned) * size, -math.sin(turned) * size
-        return np.stack([fx, fy, x * fy - y * fx], axis=-1)
+        return np.stack([fx, fy, (self.x + self.side * math.tan(self.batter) * (top - y)) * fy - y * fx], axis=-1)
 
 
 def active_thrust(
-    model: Model, own: Sequence[int], touched: Sequence[int], soil: SoilTable, side: float
-) -> ActiveThrust | str:
-    """Return the soil behind the blocks of a structure that it touches on a side (1.0: right), or why there is none.
+    model: Model, own: Collection[int], outer: Sequence[int], soil: SoilTable, side: float
+) -> ActiveThrust:
+    """Return the soil behind a structure on a side (1.0: right), where everything was placed.
 
-    `own` are all blocks of the structure. Everything is where it was placed.
+    `own` are the blocks of the structure, `outer` those of them that are outermost on that side, the lowest first.
+    Raises NotApplicableError.
     """
-    scenario, placed = model.scenario, model.bodies
-    faces = [
-        [placed[number].ground_point(*place) for place in edge[:2]]
-        for number, edge in exposed_faces(scenario, placed, touched, side)
-    ]
+    scenario, placed, (x, y) = model.scenario, model.bodies, soil.corners.T
     near = STRAIGHT * placement.smallest_width(placed[number] for number in own)
-    back = np.array(faces).reshape(-1, 2)
-    if scenario.ground.tilt != 0.0 or not scenario.gravity > 0.0:
-        return "gravity is not vertical"
-    if not len(back) or (line := _line(back[:, ::-1], near)) is None:
-        return "the back is not straight"
-    far = float(side * (side * soil.corners[:, 0]).max())
-    begin = float(side * (side * back[:, 0]).max())
+    faces = [
+        [placed[number].ground_point(*place)[::-1] for place in edge[:2]]
+        for number, edge in exposed_faces(scenario, placed, outer, side)
+    ]
+    back = np.array([face for face in faces if min(face)[0] < y.max()]).reshape(-1, 2)
+    if scenario.ground.tilt != 0.0 or not scenario.gravity > 0.0 or not len(back):
+        raise NotApplicableError("gravity is not vertical, or nothing is beside the soil")
+    lean, base = _line(back, near, "the back")  # x = base + lean y
+    begin, far = side * float((side * back[:, 1]).max()), side * float((side * x).max())
     places = begin + (far - begin) * np.linspace(0.01, 0.99, PLACES)
-    heights = [_heights(soil.corners, places, upper) for upper in (True, False)]
-    surface = _line(np.stack([places, heights[0]], axis=-1), near)
-    if surface is None:
-        return "the surface is not straight"
-    (lean, base), (rise, level) = line, surface  # x = base + lean y, y = level + rise x
-    top = (level + rise * base) / (1.0 - rise * lean)
-    low, highest = float(heights[1][0]), float(back[:, 1].max())
-    if top > highest + near:
-        return "the soil is higher than the back"
-    ends = sorted((begin, far))
-    if any(_is_among(one.corners, ends, near) for one in model.soils if one is not soil):
-        return "there are several soils"
+    lower, upper = _heights(soil.corners, places)
+    rise, level = _line(np.stack([places, upper], axis=-1), near, "the surface")  # y = level + rise x
+    top, low = (level + rise * base) / (1.0 - rise * lean), float(lower[0])
+    if top > back[:, 0].max() + near:
+        raise NotApplicableError("the soil is higher than the back")
+    others = [one.corners for one in model.soils if one is not soil]
     mine = {*own}
-    for number, body in enumerate(placed):
-        corners = np.array([body.ground_point(*place) for place in body.corners])
-        if number not in mine and corners[:, 1].max() > low + near and _is_among(corners, ends, near):
-            return f"block {body.name} is on or in the soil"
-    material = scenario.materials[soil.material]
+    beyond = (one for number, one in enumerate(placed) if number not in mine)
+    others += [np.array([body.ground_point(*place) for place in body.corners]) for body in beyond]
+    among = [one for one in others if one[:, 1].max() > low + near]
+    ends = sorted((begin + side * near, far - side * near))
+    if any(one[:, 0].min() < ends[1] and one[:, 0].max() > ends[0] for one in among):
+        raise NotApplicableError("other soils or blocks are in the soil or on it")
+    material, block = scenario.materials[soil.material], placed[outer[0]]
     slope, strength = yield_surface(material)
     angle, rising, batter = math.asin(3.0 * slope), math.atan(side * rise), math.atan(-side * lean)
-    if rising > angle:
-        return "the surface is steeper than the friction angle"
-    if abs(far - begin) < (top - low) * math.tan(math.pi / 4.0 - 0.5 * angle):
-        return "the soil is narrower than the wedge"
-    block = placed[touched[0]]
+    if rising > angle or abs(far - begin) < (top - low) * math.tan(math.pi / 4.0 - 0.5 * angle):
+        raise NotApplicableError("the surface is steeper than the friction angle, or ends within the wedge")
     rough = friction_with(scenario, soil.material, block.material, ground=False).static
     friction = min(math.atan(rough), angle)
     share = coulomb_share(angle, batter, rising, friction)
     weight, cohesion = material.density * scenario.gravity, strength / math.cos(angle)
-    place = base + lean * top
-    return ActiveThrust(side, low, top, place, batter, friction, share, weight, cohesion, block.depth)
+    return ActiveThrust(side, (low, top), base + lean * top, batter, friction, share, weight, cohesion, block.depth)
 
 
-def _line(points: Floats, near: float) -> tuple[float, float] | None:
-    """Return slope and intercept of the line through points (u, v) from the first to the last u, None where any is off."""
+def _line(points: Floats, near: float, what: str) -> tuple[float, float]:
+    """Return slope and intercept of the line from the first point (u, v) to the last, which all others are near."""
     u, v = points[np.argsort(points[:, 0], kind="stable")].T
     slope = float((v[-1] - v[0]) / (u[-1] - u[0])) if u[-1] > u[0] else 0.0
-    level = float(v[0] - slope * u[0])
-    return (slope, level) if bool((np.abs(v - slope * u - level) <= near).all()) else None
+    if (np.abs(v - v[0] - slope * (u - u[0])) > near).any():
+        raise NotApplicableError(f"{what} is not straight")
+    return slope, float(v[0] - slope * u[0])
 
 
-def _is_among(corners: Floats, ends: Sequence[float], near: float) -> bool:
-    """Return True if an outline reaches into the range between two x."""
-    return bool(corners[:, 0].min() < ends[1] - near and corners[:, 0].max() > ends[0] + near)
-
-
-def _heights(corners: Floats, places: Floats, upper: bool) -> Floats:
-    """Return how high (m) an outline reaches at some x, or how low."""
+def _heights(corners: Floats, places: Floats) -> tuple[Floats, Floats]:
+    """Return between which heights (m) an outline lies at some x."""
     (x0, y0), (x1, y1) = corners.T[..., None], np.roll(corners, -1, axis=0).T[..., None]
     with np.errstate(divide="ignore", invalid="ignore"):
         share = (places - x0) / (x1 - x0)
-    crossed = (share >= 0.0) & (share <= 1.0)
-    y = y0 + np.where(crossed, share, 0.0) * (y1 - y0)
-    return np.where(crossed, y, -math.inf).max(axis=0) if upper else np.where(crossed, y, math.inf).min(axis=0)
+    y = np.where((share >= 0.0) & (share <= 1.0), y0 + np.clip(np.nan_to_num(share), 0.0, 1.0) * (y1 - y0), math.nan)
+    return np.nanmin(y, axis=0), np.nanmax(y, axis=0)
