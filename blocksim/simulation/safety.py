@@ -1,9 +1,9 @@
 """Factors of safety by forces: what every joint across a structure carries, and how soils press on it.
 
-A joint is a level cut between a course, with all above it, and what bears them; the lowest is the base. A course are
-the blocks of a structure whose lower faces are at one height at the start. Blocks of lower courses, ground, walls, other
-structures and, below the lowest course, soil bear it with faces that rise less than 30 degrees. A structure has no
-joints where steeper faces carry more than a hundredth of a cut, as in arches and cells, or once it has fallen.
+A joint is a level cut between a course, with all above it, and what bears them; the lowest is the base. A course is the
+blocks of a structure whose lower faces are at one height at the start. It is borne by faces that rise less than 30
+degrees: of lower courses, ground, walls, other structures and, below the lowest course, soil. A structure has no joints
+where steeper faces carry more than a hundredth of a cut, as in arches and cells, or once it has fallen.
 
 Moments are about the toe, the end of the joint towards which the resultant leans. Weight, the thrust of a soil from one
 side, a load, and another body that presses from elsewhere are an item each, and stabilise or not by their own sign.
@@ -220,8 +220,9 @@ class _Sides:
         known, item_of = np.unique(item_of, return_inverse=True)
         cell, size = item_of * levels + course[body], known.size * levels
         sums = np.stack([np.bincount(cell, one, size).reshape(-1, levels) for one in (*forces.T, moment)], axis=-1)
-        acting: Floats = np.cumsum(sums[:, ::-1], axis=1)[:, ::-1]
-        return acting, np.flatnonzero(known >= first + 2 * self.count)
+        return np.flip(np.flip(sums, 1).cumsum(axis=1, dtype=np.float64), 1), np.flatnonzero(
+            known >= first + 2 * self.count
+        )
 
     def active(self, structure: Structure, cuts: "_Cuts") -> Floats | None:
         """Return the active thrust above each joint, (k, 3), as `_items`, None where there is no soil.

@@ -1,5 +1,6 @@
 """Joints across structures over their height: what they carry, where the resultant lies, factors of safety."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,9 +21,8 @@ SHEAR, PRESS = style.MEASURED_COLOUR, style.BLOCK_COLOURS[4]
 MARK: dict[str, Any] = {"marker": "o", "markersize": 3.5, "linewidth": 1.0}
 ACTIVE: dict[str, Any] = {**MARK, "markerfacecolor": "white", "linestyle": (0, (3, 2))}
 NOTES = (
-    "N, T on what is below; T, e positive to the right. Grey: kern, a sixth of the length to either side of the middle; "
-    "black: ends of the joint; arrows: resultants of soil on the structure, at their heights. Factors beyond 10 are not "
-    "drawn."
+    "N, T on what is below; T, e positive to the right. Grey: kern, a sixth of the length to either side of the middle. "
+    "Black: ends of the joint. Arrows: resultants of soil on the structure. Factors beyond 10 are not drawn."
 )
 ALARM = (
     " Mobilised factors near one are no alarm for a wall at rest, which stands under any thrust from the active one "
@@ -38,8 +38,8 @@ def draw_joints(states: Mapping[str, Safety], path: Path, title: str, paper: sty
     path = style.picture_path(path)
     shown = {row.structure: state for state, one in states.items() for row in one.joints}  # the end comes last
     if not shown:
-        reasons = [f"{name}: {text}" for one in states.values() for name, text in one.without_joints.items()]
-        raise InvalidInputError("; ".join(["this run has no joints across structures", *reasons[-1:]]))
+        reasons = [f" ({name}: {text})" for one in states.values() for name, text in one.reasons.items()]
+        raise InvalidInputError(f"this run has no joints across structures{''.join(reasons[-1:])}")
     rows = {name: [one for one in states[shown[name]].joints if one.structure == name] for name in [*shown][:MOST_ROWS]}
     has_active = any(one.active_sliding is not None for own in rows.values() for one in own)
     looks = {"N, overturning": {"color": PRESS, **MARK}, "T, sliding": {"color": SHEAR, **MARK}}
@@ -63,52 +63,40 @@ def _draw(axes: "Sequence[style.Axes]", rows: Sequence[SafetyRow], state: Safety
     table = np.array([[*row.model_dump(exclude={"structure"}).values()] for row in rows], dtype=np.float64)
     columns = dict(zip([*SafetyRow.model_fields][1:], table.T, strict=True))
     thrusts = [one for one in state.thrusts if one.on == rows[0].structure and one.side in ("left", "right")]
-    reach = [*np.abs(columns["y_mm"]), *columns["length_mm"], *(abs(one.y_mm) for one in thrusts)]
-    scale, unit = (1e-3, "m") if max(reach) >= LONG else (1.0, "mm")
+    reach = max(*np.abs(columns["y_mm"]), *columns["length_mm"], *(abs(one.y_mm) for one in thrusts))
+    scale, unit = (1e-3, "m") if reach >= LONG else (1.0, "mm")
     height, press, shear = scale * columns["y_mm"], columns["compression_N"], columns["shear_N"]
     factor, newton = unit_for(float(np.abs([press, shear]).max()), "N")
-    axes[0].plot(factor * press, height, color=PRESS, **MARK)
-    axes[0].plot(factor * shear, height, color=SHEAR, **MARK)
     half, kern = 0.5 * scale * columns["length_mm"], scale * columns["kern_mm"]
+    bars = np.stack([np.stack([-kern, kern], -1), np.stack([height, height], -1)], axis=-1)
+    style.add_lines(axes[1], bars, colors=style.GROUND_COLOUR, linewidths=3.0)
     axes[1].fill_betweenx(height, -kern, kern, color=style.GROUND_COLOUR, linewidth=0.0)
-    style.add_lines(
-        axes[1],
-        [[(-w, y), (w, y)] for w, y in zip(kern, height, strict=True)],
-        colors=style.GROUND_COLOUR,
-        linewidths=3.0,
-    )
-    for sign in (-1.0, 1.0):
-        axes[1].plot(sign * half, height, color=style.INK, linewidth=0.8, marker="|", markersize=4.0)
+    for end in (-half, half):
+        axes[1].plot(end, height, color=style.INK, linewidth=0.8, marker="|", markersize=4.0)
     axes[1].plot(scale * columns["eccentricity_mm"], height, color=style.INK, **MARK)
-    most = max((float(np.hypot(one.fx_N, one.fy_N)) for one in thrusts), default=1.0)
-    widest = float(half.max())
-    for one in thrusts:
-        tip = np.array([(1.0 if one.side == "right" else -1.0) * half.max(), scale * one.y_mm])
-        tail = tip - ARROW * 2.0 * half.max() / most * np.array([one.fx_N, one.fy_N])
-        widest = max(widest, abs(float(tail[0])))
-        axes[1].annotate(
-            "", tip, tail, arrowprops={"arrowstyle": "-|>", "color": PRESS, "shrinkA": 0.0, "shrinkB": 0.0}
-        )
-        size = f"{factor * float(np.hypot(one.fx_N, one.fy_N)):.3g} {newton}"
-        axes[1].text(
-            tip[0], tail[1], f" {size} ", ha="left" if one.side == "right" else "right", va="bottom", color=PRESS
-        )
+    sizes = [math.hypot(one.fx_N, one.fy_N) for one in thrusts]
+    widest = farthest = float(half.max())
+    for thrust, size in zip(thrusts, sizes, strict=True):
+        x, y, length = math.copysign(widest, -thrust.fx_N), scale * thrust.y_mm, 2.0 * ARROW * widest / max(sizes)
+        tail = (x - length * thrust.fx_N, y - length * thrust.fy_N)
+        farthest = max(farthest, abs(tail[0]))
+        axes[1].annotate("", (x, y), tail, arrowprops={"arrowstyle": "-|>", "color": PRESS, "shrinkA": 0, "shrinkB": 0})
+        text, away = f" {factor * size:.3g} {newton} ", "left" if x > 0.0 else "right"
+        axes[1].text(x, max(y, tail[1]), text, ha=away, va="bottom", color=PRESS)
+    for colour, values in ((PRESS, press), (SHEAR, shear)):
+        axes[0].plot(factor * values, height, color=colour, **MARK)
     for name, colour, look in zip(FACTORS, (SHEAR, PRESS) * 2, (MARK, MARK, ACTIVE, ACTIVE), strict=True):
-        values = np.where(columns[name] <= WIDEST, columns[name], np.nan)
-        axes[2].plot(values, height, color=colour, **look)
-    axes[1].set_xlim(-1.2 * widest, 1.2 * widest)
+        axes[2].plot(np.where(columns[name] <= WIDEST, columns[name], np.nan), height, color=colour, **look)
+    axes[1].set_xlim(-1.2 * farthest, 1.2 * farthest)
     axes[2].set_xlim(0.0)
-    for one, place in ((axes[0], 0.0), (axes[2], 1.0)):
-        one.axvline(place, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (4, 3)))
-    places = np.array([*height, *(scale * one.y_mm for one in thrusts)])
-    low, high = style.limits_around(places, 0.12, float(half.max()))
-    for place, (one, name) in enumerate(
-        zip(axes, (f"force ({newton})", f"e ({unit})", "factor of safety"), strict=True)
-    ):
-        one.spines[["right", "top"]].set_visible(False)
-        one.set_ylim(low, high)
-        one.tick_params(axis="y", labelleft=place == 0)
-        style.number_axis(one.xaxis, 4)
-        style.number_axis(one.yaxis)
-        one.set_xlabel(name, labelpad=2.0)
+    for panel, place in ((axes[0], 0.0), (axes[2], 1.0)):
+        panel.axvline(place, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (4, 3)))
+    limits = style.limits_around(np.array([*height, *(scale * one.y_mm for one in thrusts)]), 0.12, widest)
+    for panel, name in zip(axes, (f"force ({newton})", f"e ({unit})", "factor of safety"), strict=True):
+        panel.spines[["right", "top"]].set_visible(False)
+        panel.set_ylim(*limits)
+        panel.tick_params(axis="y", labelleft=panel is axes[0])
+        style.number_axis(panel.xaxis, 4)
+        style.number_axis(panel.yaxis)
+        panel.set_xlabel(name, labelpad=2.0)
     axes[0].set_ylabel(f"height ({unit})")

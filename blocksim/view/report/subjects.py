@@ -322,7 +322,7 @@ def _joints(run: PartialRun) -> list[dict[str, Any]]:
     """Return the joints across structures with their states, and with why there are no active factors."""
     states = {} if run.summary is None else run.summary.joints
     return [
-        {"state": state, **row.model_dump(), "why": one.without_active.get(row.structure, "")}
+        {"state": state, **row.model_dump(), "why": one.reasons.get(row.structure, "")}
         for state, one in states.items()
         for row in one.joints
     ]
