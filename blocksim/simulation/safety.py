@@ -5,8 +5,9 @@ blocks of a structure whose lower faces are at one height at the start. It is bo
 degrees: of lower courses, ground, walls, other structures and, below the lowest course, soil. A structure has no joints
 where steeper faces carry more than a hundredth of a cut, as in arches and cells, or once it has fallen.
 
-Moments are about the toe, the end of the joint towards which the resultant leans. Weight, the thrust of a soil from one
-side, a load, and another body that presses from elsewhere are an item each, and stabilise or not by their own sign.
+Moments are about the toe, the end of the joint towards which the resultant leans, or the other end where nothing
+overturns about that one. Weight, the thrust of a soil from one side, a load, and another body that presses from
+elsewhere are an item each, and stabilise or not by their own sign.
 """
 
 import math
@@ -220,9 +221,8 @@ class _Sides:
         known, item_of = np.unique(item_of, return_inverse=True)
         cell, size = item_of * levels + course[body], known.size * levels
         sums = np.stack([np.bincount(cell, one, size).reshape(-1, levels) for one in (*forces.T, moment)], axis=-1)
-        return np.flip(np.flip(sums, 1).cumsum(axis=1, dtype=np.float64), 1), np.flatnonzero(
-            known >= first + 2 * self.count
-        )
+        acting = np.flip(np.flip(sums, 1).cumsum(axis=1, dtype=np.float64), 1)
+        return acting, np.flatnonzero(known >= first + 2 * self.count)
 
     def active(self, structure: Structure, cuts: "_Cuts") -> Floats | None:
         """Return the active thrust above each joint, (k, 3), as `_items`, None where there is no soil.
@@ -262,11 +262,19 @@ class _Sides:
             share, table = None, self._soil(soil)
             weight = self.model.scenario.materials[table.material].density * self.model.scenario.gravity
             if way < UPRIGHT and weight > 0.0 and (kinds[:, :UPRIGHT] == [on, way]).all(axis=1).sum() == 1:
-                height, depth = np.ptp(self.place[own, 1]) + table.spacing, self.depth[self.body[own[0]]]
+                height, depth = self._height(soil, table.spacing, self.place[own, 0]), self.depth[self.body[own[0]]]
                 share = 2.0 * math.hypot(fx, fy) / (weight * height**2 * min(depth, depth_of_scene(self.model)))
             place = (MILLI * size @ self.place[own] / size.sum()).tolist()
             values = (table.name, names[on], SIDES[way], fx, fy, *place, turned, abs(shear) / size.sum(), share)
             yield ThrustRow.model_validate(dict(zip(ThrustRow.model_fields, values, strict=True)))
+
+    def _height(self, soil: int, spacing: float, places: Floats) -> float:
+        """Return the height (m) of a soil against a face, from the particles within two spacings of it."""
+        arrays: Any = self.moment.scene
+        points, kinds = arrays.systems[0].points, arrays.systems[0].states["kind"]  # the only system with parts
+        x, y = points["x"], points["y"]
+        is_near = (kinds == soil) & (x > places.min() - 2.0 * spacing) & (x < places.max() + 2.0 * spacing)
+        return float(np.ptp(y[is_near])) + spacing
 
     def _soil(self, number: float) -> SoilTable:
         return next(one for one in self.model.soils if one.name == self.soils[int(number)])
@@ -346,14 +354,16 @@ class _Cuts:
         self, compression: Floats, shear: Floats, eccentricity: Floats, resistance: Floats, items: Floats
     ) -> Iterator[Floats]:
         """Yield factors against sliding and overturning, nan where nothing pushes, or nothing is pressed."""
-        is_right, is_pressed = eccentricity >= 0.0, compression > 0.0
-        toe = np.where(is_right[:, None], self.right, self.left)
-        over = np.where(is_right, -1.0, 1.0) * _about(toe, items)
-        pushes, holds = np.maximum(over, 0.0).sum(axis=0), np.maximum(-over, 0.0).sum(axis=0)
+        is_pressed, overturning = compression > 0.0, []
         with np.errstate(divide="ignore", invalid="ignore"):
             slides = is_pressed & (np.abs(shear) > ROUND_OFF * compression)
             yield np.where(slides, resistance / np.abs(shear), math.nan)
-            yield np.where(is_pressed & (pushes > ROUND_OFF * holds), holds / pushes, math.nan)
+            for over in (-_about(self.right, items), _about(self.left, items)):
+                pushes, holds = np.maximum(over, 0.0).sum(axis=0), np.maximum(-over, 0.0).sum(axis=0)
+                overturning.append(np.where(is_pressed & (pushes > ROUND_OFF * holds), holds / pushes, math.nan))
+        right, left = overturning
+        toe, other = np.where(eccentricity >= 0.0, (right, left), (left, right))
+        yield np.where(np.isnan(toe), other, toe)
 
 
 def _cut_by(contacts: Indices, lower: Indices, upper: Indices) -> tuple[Indices, Indices]:

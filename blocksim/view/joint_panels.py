@@ -21,7 +21,7 @@ SHEAR, PRESS = style.MEASURED_COLOUR, style.BLOCK_COLOURS[4]
 MARK: dict[str, Any] = {"marker": "o", "markersize": 3.5, "linewidth": 1.0}
 ACTIVE: dict[str, Any] = {**MARK, "markerfacecolor": "white", "linestyle": (0, (3, 2))}
 NOTES = (
-    "N, T on what is below; T, e positive to the right. Grey: kern, a sixth of the length to either side of the middle. "
+    "N, T on what is below; T, e positive to the right. Grey: kern, a sixth of the length to both sides of the middle. "
     "Black: ends of the joint. Arrows: resultants of soil on the structure. Factors beyond 10 are not drawn."
 )
 ALARM = (
