@@ -83,7 +83,7 @@ class Safety(BaseModel, frozen=True):
     reasons: dict[str, str] = {}
 
 
-class Structure(NamedTuple):
+class LevelCourses(NamedTuple):
     """The n blocks of a structure."""
 
     name: str
@@ -100,7 +100,7 @@ def columns_of(states: dict[str, Safety]) -> trajectory.Columns:
 
 
 @derived(*GEOMETRY)
-def structures_of(model: Model) -> tuple[Structure, ...]:
+def structures_of(model: Model) -> tuple[LevelCourses, ...]:
     """Return all structures: those of the scenario, and single blocks with those that they touch at the start."""
     placed, kinds = model.bodies, [one.kind for one in model.scenario.structures]
     outlines = overlap.Outlines.of(placed)
@@ -124,7 +124,7 @@ def structures_of(model: Model) -> tuple[Structure, ...]:
         name = f"{'block ' * first.isdigit()}{first}{more}"
         if group < len(kinds):
             name = kinds[group] + f" {group + 1}" * (kinds.count(kinds[group]) > 1)
-        found.append(Structure(name, blocks, course, start[blocks]))
+        found.append(LevelCourses(name, blocks, course, start[blocks]))
     return tuple(found)
 
 
@@ -167,7 +167,7 @@ class _Sides:
         self.depth = np.full(self.count + len(self.soils), math.inf)
         self.depth[: len(model.bodies)] = [body.depth for body in model.bodies]
 
-    def cuts(self, structure: Structure) -> "_Cuts":
+    def cuts(self, structure: LevelCourses) -> "_Cuts":
         """Return the joints of a structure. Raises NotApplicableError where it has none."""
         bodies, course = self.bodies[structure.blocks], np.full(self.count + len(self.soils), NEITHER)
         is_free, (_, y, angle, side) = bodies["inverse_mass"] > 0.0, structure.start.T
@@ -224,7 +224,7 @@ class _Sides:
         acting = np.flip(np.flip(sums, 1).cumsum(axis=1, dtype=np.float64), 1)
         return acting, np.flatnonzero(known >= first + 2 * self.count)
 
-    def active(self, structure: Structure, cuts: "_Cuts") -> Floats | None:
+    def active(self, structure: LevelCourses, cuts: "_Cuts") -> Floats | None:
         """Return the active thrust above each joint, (k, 3), as `_items`, None where there is no soil.
 
         Raises NotApplicableError.

@@ -12,7 +12,7 @@ from blocksim.simulation.safety import FACTORS, Safety, SafetyRow
 from blocksim.view import style
 from blocksim.view.time_panels import unit_for
 
-PANEL, LEAST, SIDES, GAPS = (1.9, 2.2), (0.9, 1.0), (0.62, 0.14, 0.24, 0.40), (0.3, 0.72)  # inches
+PANEL, LEAST, SIDES, GAPS = (1.9, 2.2), (0.9, 1.0), (0.72, 0.14, 0.24, 0.40), (0.3, 0.72)  # inches
 MOST_ROWS = 3
 LONG = 2e3  # mm: from there on lengths are in m
 WIDEST = 10.0  # factors beyond are not drawn
@@ -86,7 +86,8 @@ def _draw(axes: "Sequence[style.Axes]", rows: Sequence[SafetyRow], state: Safety
     for colour, values in ((PRESS, press), (SHEAR, shear)):
         axes[0].plot(factor * values, height, color=colour, **MARK)
     for name, colour, look in zip(FACTORS, (SHEAR, PRESS) * 2, (MARK, MARK, ACTIVE, ACTIVE), strict=True):
-        axes[2].plot(np.where(columns[name] <= WIDEST, columns[name], np.nan), height, color=colour, **look)
+        if (drawn := columns[name] <= WIDEST).any():
+            axes[2].plot(columns[name][drawn], height[drawn], color=colour, **look)
     axes[1].set_xlim(-1.2 * farthest, 1.2 * farthest)
     axes[2].set_xlim(0.0)
     for panel, place in ((axes[0], 0.0), (axes[2], 1.0)):
