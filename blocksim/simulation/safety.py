@@ -230,7 +230,7 @@ class _Sides:
         Raises NotApplicableError.
         """
         beside = cuts.beside[self.other[cuts.beside] >= self.count]
-        beside = beside[np.abs(self.normal[beside, 0]) > 1.0 - LEVEL]
+        beside = beside[np.abs(self.normal[beside, 0]) >= np.abs(self.normal[beside, 1])]
         pressing = np.unique(np.stack([self.other[beside] - self.count, -np.sign(self.normal[beside, 0])], -1), axis=0)
         if not len(pressing):
             return None

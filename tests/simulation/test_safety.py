@@ -11,7 +11,7 @@ import pytest
 
 from blocksim import Model, Simulation, load, plot, report, run, static_limit
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import scenario_from_mapping
+from blocksim.scenario import geometry, scenario_from_mapping
 from blocksim.simulation.safety import SafetyRow
 from blocksim.world.earth_pressure import NotApplicableError, active_thrust, coulomb_share
 from tests.simulation.sliding import interrupted_at
@@ -198,6 +198,29 @@ def test_there_is_no_active_thrust_where_coulomb_has_none(changes: dict[str, obj
     model = Model(load(SOIL, changes))
     with pytest.raises(NotApplicableError, match=reason):
         active_thrust(model, [0, 1], [0, 1], model.soils[0], 1.0)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_thrust_on_a_battered_back_below_an_inclined_surface_is_coulombs(side: float) -> None:
+    lean, rise, size = 0.3, math.tan(math.radians(5.0)), 0.05  # m: the foot is 15 mm in the soil
+    block = [[-0.04, 0.0], [0.03, 0.0], [0.015, size], [-0.04, size]]
+    soil = [[0.03, 0.0], [0.23, 0.0], [0.23, size + 0.215 * rise], [0.015, size]]
+    block, soil = ([[side * x, y] for x, y in corners] for corners in (block, soil))
+    x, y = geometry.centroid([(x, y) for x, y in block])
+    rods = {"unit_weight": 20e3, "young_modulus": 5.84e6, "poisson_ratio": 0.3, "friction_angle": "30 deg"}
+    changes = {"blocks": {"wall": {"outline": block, "depth": 0.05, "material": "aluminium"}}, "structures": []}
+    changes |= {"bodies": [{"block": "wall", "x": x, "y": y}], "walls": [], "probes": [], "materials.rods": rods}
+    model = Model(load(SOIL, {**changes, "soils.0.outline": soil, "pairs.rods.aluminium.friction": "20 deg"}))
+    found = active_thrust(model, [0], [0], model.soils[0], side)
+    fx, fy, moment = found.above(np.zeros(1))[0]
+    batter, friction = math.atan(lean), math.radians(20.0)
+    share = coulomb_share(math.radians(30.0), batter, math.radians(5.0), friction)
+    thrust = 0.5 * 20e3 * share * size**2 * 0.05
+    assert (fx, fy) == pytest.approx(
+        (-side * thrust * math.cos(batter + friction), -thrust * math.sin(batter + friction)), rel=1e-6
+    )
+    x, y = side * (0.03 - lean * size / 3.0), size / 3.0
+    assert moment == pytest.approx(x * fy - y * fx, rel=1e-6)
 
 
 def test_cohesion_takes_thrust_away_and_leaves_no_tension() -> None:
