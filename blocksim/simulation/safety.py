@@ -17,11 +17,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from pydantic import BaseModel
 
-from blocksim.kernels.common.arrays import LOAD_FIELD, LOAD_TILT
 from blocksim.scenario import Model, derived, events, overlap
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.placement import GEOMETRY
-from blocksim.simulation import instruments, observables, trajectory
+from blocksim.simulation import balance, instruments, observables, trajectory
 from blocksim.simulation.trajectory import MILLI
 from blocksim.world import earth_pressure
 from blocksim.world.systems import systems_of
@@ -197,15 +196,16 @@ class _Sides:
         Also which items are soils.
         """
         world, bodies, numbers = self.world, self.bodies, dict[int, int]()
+        kinds = balance.solver_module("kernels.common.arrays")
         pulls = {0: np.array([world.controls[0].gravity_x, world.controls[0].gravity_y])}  # m/s2
         parts: list[tuple[Any, ...]] = []  # item, body, forces, moment about the place, place
         centre = np.stack([bodies["x"], bodies["y"]], axis=-1)
         for load, one in zip(world.loads, (*self.model.acting_loads, *self.model.scenario.actuators), strict=True):
             value = instruments.value_of(world, load, self.moment.time)
             item = numbers.setdefault(id(getattr(one, "load", one)), 1 + len(numbers))
-            if load.kind == LOAD_TILT:
+            if load.kind == kinds.LOAD_TILT:
                 pulls[0] = -float(load.fx) * np.array([math.sin(value), math.cos(value)])
-            elif load.kind == LOAD_FIELD:
+            elif load.kind == kinds.LOAD_FIELD:
                 pulls[item] = value * np.array([load.fx, load.fy])
             elif course[load.body] != NEITHER:
                 force = np.array([[load.last_fx, load.last_fy]])
@@ -355,6 +355,8 @@ class _Cuts:
     ) -> Iterator[Floats]:
         """Yield factors against sliding and overturning, nan where nothing pushes, or nothing is pressed."""
         is_pressed, overturning = compression > 0.0, []
+        # on a point the weight, the first item, is on the other side of it
+        leaning = np.where(self.length > 0.0, eccentricity, _about(self.middle, items)[0])
         with np.errstate(divide="ignore", invalid="ignore"):
             slides = is_pressed & (np.abs(shear) > ROUND_OFF * compression)
             yield np.where(slides, resistance / np.abs(shear), math.nan)
@@ -362,7 +364,7 @@ class _Cuts:
                 pushes, holds = np.maximum(over, 0.0).sum(axis=0), np.maximum(-over, 0.0).sum(axis=0)
                 overturning.append(np.where(is_pressed & (pushes > ROUND_OFF * holds), holds / pushes, math.nan))
         right, left = overturning
-        toe, other = np.where(eccentricity >= 0.0, (right, left), (left, right))
+        toe, other = np.where(leaning >= 0.0, (right, left), (left, right))
         yield np.where(np.isnan(toe), other, toe)
 
 

@@ -71,6 +71,19 @@ def test_block_pushed_by_a_force_has_the_factors_of_the_textbook_and_of_statics(
 
 
 @both
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_block_that_rocks_on_its_toe_has_a_factor_below_one(scheme: str, way: float) -> None:
+    size = 1.25 * WEIGHT * 0.5 * WIDTH / HEIGHT
+    pushed = push(way * size, point=[0.0, 0.5 * HEIGHT])
+    simulation = Simulation(scene(scheme, loads=[pushed], start={})).advance(to=0.01)
+    (row,) = simulation.joints().to_dict("records")
+    assert (row["length_mm"], row["eccentricity_mm"]) == (0.0, pytest.approx(0.0, abs=1e-9))
+    assert row["overturning"] == pytest.approx(0.8, rel=1e-2)
+    assert math.isnan(row["pressure_Pa"])
+    assert math.isnan(row["linear_pressure_Pa"])
+
+
+@both
 def test_every_joint_of_a_stack_has_the_factors_of_what_is_above_it(scheme: str) -> None:
     size, angle = 30.0, -0.4
     pushed = push(size, "3", direction=f"{angle} rad", point=[0.0, 0.5 * HEIGHT])
@@ -89,12 +102,13 @@ def test_every_joint_of_a_stack_has_the_factors_of_what_is_above_it(scheme: str)
 
 def test_dam_has_the_factors_of_sums_by_hand_at_every_level_of_the_water() -> None:
     simulation, weight = Simulation(load("scenarios/dam.toml")), 2400.0 * 40.0 * 9.81
+    thrust, row = 0.0, dict[Any, Any]()
     for level in (4.0, 7.0, 10.0):
         (row,) = simulation.advance(to=0.4 * level).joints().to_dict("records")
         thrust = 0.5 * 9810.0 * level**2
         assert row["sliding"] == pytest.approx(0.75 * weight / thrust, rel=2e-3)
         assert row["overturning"] == pytest.approx(weight * 2.0 / (thrust * level / 3.0), rel=2e-3)
-    off = thrust * level / 3.0 / weight
+    off = thrust * 10.0 / 3.0 / weight
     assert off > 4.0 / 6.0  # beyond the kern
     assert row["linear_pressure_Pa"] == pytest.approx(2.0 * weight / (3.0 * (2.0 - off)), rel=5e-3)
 
@@ -208,7 +222,10 @@ def test_thrust_on_a_battered_back_below_an_inclined_surface_is_coulombs(side: f
     block, soil = ([[side * x, y] for x, y in corners] for corners in (block, soil))
     x, y = geometry.centroid([(x, y) for x, y in block])
     rods = {"unit_weight": 20e3, "young_modulus": 5.84e6, "poisson_ratio": 0.3, "friction_angle": "30 deg"}
-    changes = {"blocks": {"wall": {"outline": block, "depth": 0.05, "material": "aluminium"}}, "structures": []}
+    changes: dict[str, Any] = {
+        "blocks": {"wall": {"outline": block, "depth": 0.05, "material": "aluminium"}},
+        "structures": [],
+    }
     changes |= {"bodies": [{"block": "wall", "x": x, "y": y}], "walls": [], "probes": [], "materials.rods": rods}
     model = Model(load(SOIL, {**changes, "soils.0.outline": soil, "pairs.rods.aluminium.friction": "20 deg"}))
     found = active_thrust(model, [0], [0], model.soils[0], side)
