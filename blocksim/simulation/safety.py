@@ -12,6 +12,7 @@ elsewhere are an item each, and stabilise or not by their own sign.
 
 import math
 from collections.abc import Iterator
+from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ LEVEL = math.cos(math.radians(30.0))  # least upward part of the normal of a fac
 STEEP_SHARE = 0.01  # of the compression of a cut, by steeper faces
 SAME_HEIGHT = 0.01  # of the smallest side
 ROUND_OFF = 1e-9  # of the compression, and of moments
-MOST_JOINTS = 200  # of a state; of more the lowest
+MOST_JOINTS = 200  # of a state, and thrusts; of more joints the lowest
 NEITHER = -1
 SIDES, UPRIGHT = ("right", "left", "top", "bottom"), 2  # of faces, and how many of them are upright
 FACTORS = ("sliding", "overturning", "active_sliding", "active_overturning")
@@ -143,7 +144,7 @@ def safety_of(model: Model, scene: "AnyScene") -> Safety:
             reasons[structure.name] = f"no joints: {reason}"
     lowest = sorted(range(len(rows)), key=lambda number: rows[number].joint)[:MOST_JOINTS]
     joints = tuple(rows[number] for number in sorted(lowest))
-    return Safety(joints=joints, thrusts=tuple(sides.thrusts()), reasons=reasons)
+    return Safety(joints=joints, thrusts=tuple(islice(sides.thrusts(), MOST_JOINTS)), reasons=reasons)
 
 
 class _Sides:
@@ -355,8 +356,8 @@ class _Cuts:
     ) -> Iterator[Floats]:
         """Yield factors against sliding and overturning, nan where nothing pushes, or nothing is pressed."""
         is_pressed, overturning = compression > 0.0, []
-        # on a point the weight, the first item, is on the other side of it
-        leaning = np.where(self.length > 0.0, eccentricity, _about(self.middle, items)[0])
+        has_length = self.length > 0.0  # on a point the weight, the first item, is on the other side of it
+        leaning = np.where(has_length, eccentricity, _about(self.middle, items)[0])
         with np.errstate(divide="ignore", invalid="ignore"):
             slides = is_pressed & (np.abs(shear) > ROUND_OFF * compression)
             yield np.where(slides, resistance / np.abs(shear), math.nan)
@@ -365,7 +366,7 @@ class _Cuts:
                 overturning.append(np.where(is_pressed & (pushes > ROUND_OFF * holds), holds / pushes, math.nan))
         right, left = overturning
         toe, other = np.where(leaning >= 0.0, (right, left), (left, right))
-        yield np.where(np.isnan(toe), other, toe)
+        yield np.where(np.isnan(toe) & has_length, other, toe)
 
 
 def _cut_by(contacts: Indices, lower: Indices, upper: Indices) -> tuple[Indices, Indices]:

@@ -84,6 +84,14 @@ def test_block_that_rocks_on_its_toe_has_a_factor_below_one(scheme: str, way: fl
 
 
 @both
+def test_weight_alone_overturns_nothing_that_rocks_on_its_toe(scheme: str) -> None:
+    bodies = [{"block": "b", "x": 0.0, "y": 0.5 * HEIGHT, "spin": "-0.5 rad/s", "velocity": [0.1, 0.05]}]
+    (row,) = Simulation(scene(scheme, bodies=bodies, start={})).advance(to=0.01).joints().to_dict("records")
+    assert row["length_mm"] == 0.0
+    assert math.isnan(row["overturning"])
+
+
+@both
 def test_every_joint_of_a_stack_has_the_factors_of_what_is_above_it(scheme: str) -> None:
     size, angle = 30.0, -0.4
     pushed = push(size, "3", direction=f"{angle} rad", point=[0.0, 0.5 * HEIGHT])
