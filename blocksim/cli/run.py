@@ -1,8 +1,9 @@
 """blocksim run: simulate one scenario."""
 
+import math
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
 from itertools import islice
@@ -13,13 +14,15 @@ import typer
 
 from blocksim.cli import command_line, compare, output, prepare, progress
 from blocksim.options import Option
-from blocksim.simulation import Result, files, loop, observables, rest_state, trajectory
+from blocksim.simulation import Result, files, loop, observables, rest_state, safety, trajectory
 from blocksim.simulation.run import RunCallbacks
 from blocksim.study import compare as judgement, rows, run
 
 MOST_ROWS = 40  # of the final table on the screen; of a longer one the first FIRST_ROWS are shown
 FIRST_ROWS = 10
 INTERRUPTED = "interrupted"
+MOST_BASES = 6  # of structures whose factors of safety are on the screen
+IDLE = 1e3  # factors beyond are those of round-off
 
 
 def run_command(
@@ -131,6 +134,30 @@ def _answer_lines(result: Result) -> list[str]:
     return lines
 
 
+def _joint_lines(states: Mapping[str, safety.Safety]) -> Iterator[str]:
+    """Yield the factors of safety at the bases of structures that anything pushes: at the end, or as they settled."""
+    bases = {row.structure: (state, row) for state, one in states.items() for row in one.joints if row.joint == 0}
+    pushed = [one for one in bases.values() if min(one[1].sliding or math.inf, one[1].overturning or math.inf) < IDLE]
+    for state, row in pushed[:MOST_BASES]:
+        ways = []
+        for way in ("sliding", "overturning"):
+            active = getattr(row, f"active_{way}")
+            more = "" if active is None else f" (active {_factor(active)})"
+            ways.append(f"{way} {_factor(getattr(row, way))}{more}")
+        yield f"{row.structure} base{'' if state == 'end' else f', {state}'}: {', '.join(ways)}"
+    if len(pushed) > MOST_BASES:
+        yield f"... and {len(pushed) - MOST_BASES} more structures in joints.csv"
+    if pushed:
+        yield "  factors of safety mobilised by the forces of the run"
+    if any(row.active_sliding is not None for _, row in pushed):
+        yield "  near 1 they are no alarm for a wall at rest, which stands under any thrust"
+        yield "  from the active one to that which overturns it"
+
+
+def _factor(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}" if value < IDLE else f"> {IDLE:g}"
+
+
 def _end_lines(result: Result, shown: Sequence[str]) -> Iterator[str]:
     """Yield how a run went, and a line that separates this from the answer."""
     summary = result.summary
@@ -154,5 +181,6 @@ def _end_lines(result: Result, shown: Sequence[str]) -> Iterator[str]:
         )
     if moved is not None and summary.reason != loop.REST.reason and moved.fastest_m_s > result.scenario.time.rest_speed:
         yield f"not at rest: block {moved.fastest_block} at {moved.fastest_m_s:.2g} m/s"
+    yield from _joint_lines(summary.joints)
     yield from (f"warning: {text}" for text in summary.warnings if text not in shown)
     yield ""

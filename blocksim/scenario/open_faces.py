@@ -90,7 +90,7 @@ def faces_under(scenario: Scenario, load: Pressure, placed: Placement) -> Sequen
     side = structure, side_of(scenario, load, placed)
     if side not in sides:
         own = [number for number, origin in enumerate(origins) if origin == ("structures", structure - 1)]
-        sides[side] = tuple(_open_faces(scenario, bodies, own, side[1])) if own else ()
+        sides[side] = tuple(exposed_faces(scenario, bodies, own, side[1])) if own else ()
     faces: tuple[OpenFace, ...] = sides[side]
     return faces
 
@@ -160,7 +160,7 @@ def _ground_below(scenario: Scenario, left: float, right: float, depth: float) -
     return np.array(rows).reshape(-1, 4, 2)
 
 
-def _open_faces(
+def exposed_faces(
     scenario: Scenario, placed: Sequence[PlacedBody], own: Sequence[int], side: float
 ) -> Iterator[OpenFace]:
     """Yield what is open on a side of the free blocks of a structure, in their order."""

@@ -277,7 +277,7 @@ def unsupported(scenario: Scenario, placed: Sequence[placement.PlacedBody], near
     heights = outlines.bottom if is_level else np.full(labels.size, np.inf)
     labels[heights <= near] = CARRIED
     one, other, _ = pairs_within(outlines, near)
-    labels = _spread(labels, one, other)
+    labels = spread(labels, one, other)
     loose = np.flatnonzero(labels != CARRIED)
     if not loose.size:
         return [], 0.0
@@ -291,7 +291,7 @@ def unsupported(scenario: Scenario, placed: Sequence[placement.PlacedBody], near
         reach *= 4.0  # times the reach, from one search for the nearest neighbour to the next
 
 
-def _spread(labels: Integers, one: Integers, other: Integers) -> Integers:
+def spread(labels: Integers, one: Integers, other: Integers) -> Integers:
     """Return one label for all that touch, directly or over others: the least number among them, or CARRIED."""
     roots = np.append(0, labels - CARRIED)  # the first is what carries
     while True:

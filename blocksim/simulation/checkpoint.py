@@ -6,7 +6,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -20,7 +20,7 @@ from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.kernels.common.arrays import zeros
 from blocksim.options import Option
 from blocksim.scenario import Model, Scenario, resolution, units
-from blocksim.simulation import files, instruments, provenance, results
+from blocksim.simulation import files, instruments, provenance, results, safety
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stores.hdf5 import read_probes, read_rows
 from blocksim.world import build, free_memory
@@ -42,6 +42,7 @@ class Position(BaseModel, frozen=True):
     total_seconds: float = 0.0
     threads: int  # that it ran on; it can continue with any number
     settled: results.RestState | None = None  # how it came to rest before time zero, where it did
+    joints: dict[str, safety.Safety] = {}  # then
     resumed_from: tuple[int, ...] = ()  # steps at which earlier parts of the run were resumed
     events: tuple[results.EventRecord, ...] = ()  # that have happened so far
 
@@ -212,6 +213,7 @@ class Past:
     checkpoint: Path | None = None  # from which this part continues
     step: int | None = None  # of that checkpoint
     settled: results.RestState | None = None  # how it came to rest before time zero, where it did
+    joints: dict[str, safety.Safety] = field(default_factory=dict)  # then
 
 
 @dataclass
@@ -251,7 +253,7 @@ class CheckpointWriter:
         if position.step == self.last_step:
             return
         self.sync()
-        whole = {"settled": self.past.settled, "resumed_from": self.past.resumed_from}
+        whole = {"settled": self.past.settled, "joints": self.past.joints, "resumed_from": self.past.resumed_from}
         total = self.past.seconds + time.monotonic() - self.began
         position = position.model_copy(update={**whole, "total_seconds": total})
         write_checkpoint(self.paths[0], scene, position, self.origin)

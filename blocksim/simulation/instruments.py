@@ -253,13 +253,17 @@ def actuator_sampler(number: int) -> Sampler:
         arm_x, arm_y = _arm(float(body.angle), (float(load.x), float(load.y)))
         way = (body.x + arm_x - load.base_x) * load.fx + (body.y + arm_y - load.base_y) * load.fy
         force = load.last_fx * load.fx + load.last_fy * load.fy
-        pieces = world.load_pieces[load.first_piece : load.last_piece]
-        piece = pieces[max(0, int(np.searchsorted(pieces["start"], moment.time, side="right")) - 1)]
-        since = moment.time - piece.start
-        head = piece.value + since * (piece.rate + since * (0.5 * piece.acceleration + since * piece.jerk / 6.0))
-        return float(force), float(way), float(head), float(load.work)
+        return float(force), float(way), value_of(world, load, moment.time), float(load.work)
 
     return sample
+
+
+def value_of(world: Any, load: Any, time: float) -> float:
+    """Return the value of a load at a time (s), as kernels find it: a factor, a level, a tilt or a displacement."""
+    pieces = world.load_pieces[load.first_piece : load.last_piece]
+    piece = pieces[max(0, int(np.searchsorted(pieces["start"], time, side="right")) - 1)]
+    since = time - piece.start
+    return float(piece.value + since * (piece.rate + since * (0.5 * piece.acceleration + since * piece.jerk / 6.0)))
 
 
 def _arm(angle: float, at: tuple[float, float]) -> tuple[float, float]:

@@ -21,7 +21,7 @@ from blocksim.kernels.common import arrays, mechanics, tolerances
 from blocksim.kernels.common.loads import value_at
 from blocksim.scenario import Model, PlacedBody, Source, events
 from blocksim.scenario.models.timeline import Event
-from blocksim.simulation import balance, checkpoint, instruments, observables, results, schemes
+from blocksim.simulation import balance, checkpoint, instruments, observables, results, safety, schemes, trajectory
 from blocksim.simulation.rest_state import initial_scene
 from blocksim.world import systems
 
@@ -601,6 +601,19 @@ class Simulation:
         for name in ("body_a", "body_b"):
             table[name] = [self.names[number] if number >= 0 else "" for number in table[name]]
         return table
+
+    def joints(self) -> "pd.DataFrame":
+        """Return the joints across structures with the forces of the last step, as joints.csv has them.
+
+        Examples
+        --------
+        >>> from blocksim import Simulation
+        >>> simulation = Simulation("scenarios/dam.toml").advance(to=4)  # the water is at the crest
+        >>> simulation.joints().round(2)[["structure", "joint", "sliding", "overturning"]].values.tolist()
+        [['dam', 0, 1.44, 1.15]]
+        """
+        found = safety.columns_of({"": safety.safety_of(self.model, self.scene)})
+        return trajectory.as_frame({name: found[name] for name in safety.SafetyRow.model_fields})
 
     def energy(self) -> balance.EnergyLedger:
         """Return where the energy (J) is and went, with the residual."""

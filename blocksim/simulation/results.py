@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import InvalidInputError
 from blocksim.notebook import Shown
 from blocksim.scenario import Model, Scenario, input_files
-from blocksim.simulation import balance, files, instruments, observables, trajectory
+from blocksim.simulation import balance, files, instruments, observables, safety, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
 from blocksim.world.systems import systems_of
 
@@ -90,6 +90,7 @@ class Summary(BaseModel, frozen=True):
     settled: RestState | None = None  # how it came to rest before time zero, where it did
     events: tuple[EventRecord, ...] = ()  # in the order in which they have happened
     movement: observables.Movement | None = None  # None without blocks
+    joints: dict[str, safety.Safety] = {}  # "settled" before time zero, where it did, and "end"; without blocks none
     warnings: tuple[str, ...]
     environment: dict[str, str]
     sha256: dict[str, str] = {}  # none before files are written
@@ -231,7 +232,7 @@ def read_final(folder: Path, model: Model) -> trajectory.Columns:
 
 
 def _with_checksums(summary: Summary, folder: Path, tables: Iterable[str]) -> Summary:
-    names = (files.SCENARIO, *files.COPIES, files.FINAL, files.SOILS, files.FRAMES, *tables)
+    names = (files.SCENARIO, *files.COPIES, files.FINAL, files.JOINTS, files.SOILS, files.FRAMES, *tables)
     sums = {name: files.sha256_of(folder / name) for name in names if (folder / name).is_file()}
     return summary.model_copy(update={"sha256": sums})
 
@@ -239,6 +240,8 @@ def _with_checksums(summary: Summary, folder: Path, tables: Iterable[str]) -> Su
 def keep_result(result: Result, summary: Summary, folder: Path) -> Result:
     """Keep the tables and the summary of a run that has ended in its folder, beside its frames. Raises OutputError."""
     files.write_text(folder / files.FINAL, trajectory.csv_text(result.columns))
+    if any(one.joints for one in summary.joints.values()):
+        files.write_text(folder / files.JOINTS, trajectory.csv_text(safety.columns_of(summary.joints)))
     for name, table in result.endings.items():
         files.write_text(folder / f"{name}.csv", trajectory.csv_text(table))
     probes = read_probes(folder / files.FRAMES, result.model)

@@ -22,6 +22,7 @@ from blocksim.scenario.models.timeline import Nonsmooth
 from blocksim.simulation import balance, checkpoint, files, instruments, loop, observables, provenance, results, schemes
 from blocksim.simulation.interruption import WallTime, stop_requests
 from blocksim.simulation.rest_state import initial_scene
+from blocksim.simulation.safety import Safety, safety_of
 from blocksim.simulation.stores.hdf5 import FrameFile
 from blocksim.simulation.trajectory import final_columns
 from blocksim.world import build, free_memory, memory, sag, systems
@@ -128,8 +129,9 @@ def simulate(
     began += _compiled(model)
     with _attended(model, scene, threads, limit, on_progress) as (recorder, team, control):
         scene, settled = initial_scene(scene, model, team, control.stop)
+        joints = _settled_joints(model, scene, settled)
         ended = loop.run_loop(scene, recorder, model.scenario.time.end, team=team, control=control)
-    return _result(model, recorder, ended, time.perf_counter() - began, settled)
+    return _result(model, recorder, ended, time.perf_counter() - began, settled, joints)
 
 
 def simulate_into(
@@ -169,19 +171,21 @@ def simulate_into(
         with _attended(model, scene, threads, limit, on_progress) as (recorder, team, control):
             if stored is None:
                 scene, settled = initial_scene(scene, model, team, control.stop)
-                past = checkpoint.Past(settled=settled)
+                past = checkpoint.Past(settled=settled, joints=_settled_joints(model, scene, settled))
                 files.prepare_folder(folder, overwrite=overwrite or resume)
             else:
                 scene, position = checkpoint.restore_scene(stored, scene), stored.head.position
                 settled, parts = position.settled, (*position.resumed_from, position.step)
-                past = checkpoint.Past(position.total_seconds, parts, stored.path, position.step, settled)
+                total, joints = position.total_seconds, position.joints
+                past = checkpoint.Past(total, parts, stored.path, position.step, settled, joints)
                 checkpoint.take_over(stored, model, recorder)
             toml = files.keep_scenario(scenario, tables, folder)
             with FrameFile(folder / files.FRAMES, recorder, toml, schemes.ledger_names(scene)) as sink:
                 recorder.sink = sink
                 del recorder.held[:-1]  # the file has them
                 probes = (f"{files.PROBE}{name}.csv" for name in model.probes)
-                files.clear_remains(folder, (files.FINAL, files.SOILS, files.SUMMARY, *probes))  # of the part before
+                remains = (files.FINAL, files.JOINTS, files.SOILS, files.SUMMARY, *probes)
+                files.clear_remains(folder, remains)  # of the part before
                 periods = precautions.periods(recorder.time_step)
                 seconds = precautions.checkpoint_seconds
                 writer = checkpoint.CheckpointWriter(
@@ -189,7 +193,7 @@ def simulate_into(
                 )
                 with_writer, since = replace(control, checkpoints=writer), stored and stored.head.position
                 ended = loop.run_loop(scene, recorder, scenario.time.end, team=team, control=with_writer, since=since)
-            result = _result(model, recorder, ended, time.perf_counter() - began, settled)
+            result = _result(model, recorder, ended, time.perf_counter() - began, settled, past.joints)
             altered, warnings = recorder.altered, (*resumption.remarks, *result.summary.warnings)
             if altered:
                 more = f" and {len(altered) - 1} more" if len(altered) > 1 else ""
@@ -235,12 +239,18 @@ def _attended(
         yield recorder, team, control
 
 
+def _settled_joints(model: Model, scene: schemes.AnyScene, settled: results.RestState | None) -> dict[str, Safety]:
+    """Return the joints across structures that have come to rest before time zero."""
+    return {"settled": safety_of(model, scene)} if settled is not None and settled.at_rest else {}
+
+
 def _result(
     model: Model,
     recorder: instruments.Recorder,
     ended: loop.LoopResult,
     seconds: float,
     settled: results.RestState | None,
+    joints: dict[str, Safety],
 ) -> results.Result:
     scenario, frames = model.scenario, recorder.frames()
     world, step = ended.scene.world, recorder.time_step
@@ -279,6 +289,7 @@ def _result(
         settled=settled,
         events=ended.events,
         movement=movement,
+        joints={**joints, "end": safety_of(model, ended.scene)} if recorder.placed else {},
         warnings=tuple(_warnings(model, ended, settled)),
         environment=provenance.environment(),
     )

@@ -19,11 +19,12 @@ from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.simulation import files
 from blocksim.study import answer, capacity, compare, manifest, run_folder, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, X, quarter_turns
-from blocksim.view import animation, paints, run_data, scene, studies, style, time_panels
+from blocksim.view import animation, joint_panels, paints, run_data, scene, studies, style, time_panels
 from blocksim.view.kinds import (
     CAPACITY,
     FINAL,
     HISTORY,
+    JOINTS,
     MOTION,
     OF_RECORDS,
     PROBE,
@@ -280,8 +281,8 @@ class PlotOptions(style.PageOptions):
         str | None,
         Option(
             "Of a run: strip (default), final, history, profile (the surface of soil), motion (of the supports), "
-            "probe or capacity (of actuators). Of a sweep: lines, map (two inputs), matrix (every two inputs) or "
-            "histogram; tornado for sensitivities (default: what suits).",
+            "joints (factors of safety), probe or capacity (of actuators). Of a sweep: lines, map (two inputs), "
+            "matrix (every two inputs) or histogram; tornado for sensitivities (default: what suits).",
             metavar="KIND",
             complete="kinds",
         ),
@@ -343,6 +344,9 @@ def draw_run(find: Callable[[], run_folder.StoredRun], options: PlotOptions) -> 
     picture = options.picture(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
     if kind == CAPACITY:
         capacity.draw_capacity(scenario, stored.probes(), curves, picture, options.paper)
+        return picture, stored.remark
+    if kind == JOINTS:
+        joint_panels.draw_joints(stored.joints, picture, f"{scenario.name}: joints", options.paper)
         return picture, stored.remark
     if draw is None:
         time_panels.draw_probes(

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Model, spelling
-from blocksim.simulation import files, instruments, results, trajectory
+from blocksim.simulation import files, instruments, results, safety, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
 from blocksim.study.rows import FINISHED, TABLE
 
@@ -100,6 +100,7 @@ class StoredRun(NamedTuple):
     events: tuple[results.EventRecord, ...]  # that have happened; none where run.json is missing or damaged
     remark: str  # for whoever examines the frames; empty for a finished run that was meant for certain
     probes: Callable[[], Mapping[str, instruments.ProbeSeries]]  # samples by name
+    joints: Mapping[str, safety.Safety] = {}  # across structures, as settled and at the end
 
 
 def read_run(place: Path | str) -> StoredRun:
@@ -111,16 +112,18 @@ def read_run(place: Path | str) -> StoredRun:
     model = Model.stored(folder / files.SCENARIO)
     frames = read_frames(folder / files.FRAMES, model)
     events: tuple[results.EventRecord, ...] = ()
+    joints: Mapping[str, safety.Safety] = {}
     state = "this run was killed or is still running"
     if (folder / files.SUMMARY).is_file():
         state = f"{files.SUMMARY} of this run is damaged"
         with suppress(BlocksimError):
             summary = results.read_summary(folder / files.SUMMARY)
+            joints = summary.joints
             events, was = summary.events, "was" if summary.status == "interrupted" else "has"
             state = f"this run {was} {summary.status} ({summary.reason})" if summary.status != FINISHED else ""
     end = f"{folder}: {state}; its {len(frames)} frames end at {float(frames.time[-1]):.4g} s"
     probes = partial(read_probes, folder / files.FRAMES, model)
-    return StoredRun(folder, model, frames, events, end if state else choice(Path(place), folder), probes)
+    return StoredRun(folder, model, frames, events, end if state else choice(Path(place), folder), probes, joints)
 
 
 def choice(place: Path, folder: Path) -> str:

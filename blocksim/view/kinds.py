@@ -15,7 +15,8 @@ STRIP, FINAL, HISTORY, PROFILE, THRUST = "strip", "final", "history", "profile",
 MOTION = "motion"  # of the supports; needs no run
 PROBE = "probe"
 CAPACITY = "capacity"  # of actuators
-OF_RECORDS = (PROBE, CAPACITY)  # need no frames
+JOINTS = "joints"  # across structures
+OF_RECORDS = (PROBE, CAPACITY, JOINTS)  # need no frames
 RUN_KINDS: dict[str, Callable[[Frames, Path, scene.PictureOptions], None]] = {
     STRIP: strip.draw_strip,
     FINAL: final.draw_final,

@@ -192,7 +192,8 @@ def test_times_of_all_parts_are_summed_and_told(begun: Path) -> None:
     assert told["total_seconds"] > checkpoint.head.position.total_seconds > 0.0
     assert before["last_checkpoint"] == 1000
     assert told["last_checkpoint"] is None
-    assert {path.name for path in begun.iterdir()} == {"scenario.toml", "final.csv", "run.h5", "run.json", "done.json"}
+    left = {"scenario.toml", "final.csv", "joints.csv", "run.h5", "run.json", "done.json"}
+    assert {path.name for path in begun.iterdir()} == left
     assert resumed.reason == "end of simulated time"
     with pytest.raises(OutputExistsError, match="contains another run"):
         simulate_into(sliding({}, end=0.07), begun, resume=True)

@@ -14,10 +14,12 @@ from blocksim.scenario.geometry import regular
 from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure, Stretch
 from blocksim.scenario.motion import MotionPieces
 from blocksim.scenario.open_faces import NO_FACE
+from blocksim.simulation.safety import Safety, SafetyRow, ThrustRow
 from blocksim.simulation.trajectory import Frames
 from blocksim.view import style
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
+from blocksim.view.joint_panels import draw_joints
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.paints import by_speed, by_turn
 from blocksim.view.run_data import LoadOverTime, Support, support_of
@@ -233,6 +235,32 @@ def odd(blocks: int) -> Frames:
     return replace(toppling(blocks), names=HOSTILE[:blocks])
 
 
+def courses(name: str, count: int, size: float, *, active: bool = True) -> Safety:
+    """Return a wall of so many courses of this size (m), with soil on its right."""
+    rows = []
+    for number in range(count):
+        above = count - number
+        values = (name, number, 1e3 * size * number, 1e3 * above, -10.0 * above**2, -5.0 * above, 2.4e3 * size)
+        factors = (60.0 / above, 6.0 / above, 90.0 / above, 9.0 / above) if active else (None, 2.5, None, None)
+        named = zip(SafetyRow.model_fields, (*values, 4e2 * size, *factors, None, None), strict=True)
+        rows.append(SafetyRow.model_validate(dict(named)))
+    thrust = dict(zip(ThrustRow.model_fields, ("sand", name, "right", -10.0 * count**2, -9.0 * count), strict=False))
+    place = {"x_mm": 0.0, "y_mm": 4e2 * size * count, "inclination_deg": 5.0, "mobilised": 0.1, "share": 0.3}
+    return Safety(joints=tuple(rows), thrusts=(ThrustRow.model_validate(thrust | place),) * active)
+
+
+def joints(path: Path, paper: Paper) -> None:
+    """Draw a wall beside soil at the end, and one that has fallen as it settled."""
+    fallen = courses("stack", 3, 0.025, active=False)
+    draw_joints({"settled": fallen, "end": courses("wall", 8, 0.5)}, path, "a run: joints", paper)
+
+
+def odd_joints(path: Path, paper: Paper) -> None:
+    """Draw more structures than a page has, with names that nobody expects."""
+    walls = [courses(name, 1, 1.0, active=False) for name in ODD]
+    draw_joints({"end": Safety(joints=tuple(row for one in walls for row in one.joints))}, path, ODD[0], paper)
+
+
 ODD = ("W" * 200, *HOSTILE)
 CHOICE: dict[str, Any] = {"panels": ("displacement", "energy"), "blocks": ("3",)}
 DRAWINGS: dict[str, Drawing] = {
@@ -301,6 +329,8 @@ DRAWINGS: dict[str, Drawing] = {
         draw_history, toppling(20), panels=("x", "energy"), blocks=tuple(map(str, range(1, 13)))
     ),
     "history with odd names": of_run(draw_history, odd(6), title=HOSTILE[0] * 20),
+    "joints": joints,
+    "joints of odd names": odd_joints,
     "levels": lambda path, paper: draw_levels([panel()], path, title="slide", measured={"b1": 7.0}, paper=paper),
     "levels of three studies": lambda path, paper: draw_levels([LONG] * 3, path, title="slide", paper=paper),
     "work": lambda path, paper: draw_work_precision(work(), path, title="engines " * 30, paper=paper),

@@ -20,11 +20,25 @@ from tests.view.made_up import overlapping
 from tests.view.study_drawings import STUDIES
 
 ALL = DRAWINGS | STUDIES
-KINDS = ("strip", "final", "history", "levels", "work", "tornado", "series", "lines", "map", "matrix", "histogram")
+KINDS = (
+    "strip",
+    "final",
+    "history",
+    "joints",
+    "levels",
+    "work",
+    "tornado",
+    "series",
+    "lines",
+    "map",
+    "matrix",
+    "histogram",
+)
 SIZES = {
     "strip": (4.0, 8.0),
     "final": (3.2, 4.6),
     "history": (6.0, 8.0),
+    "joints": (8.0, 6.0),
     "levels": (3.5, 2.5),
     "levels of three studies": (8.0, 3.0),
     "work": (6.0, 2.6),

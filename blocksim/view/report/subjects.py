@@ -248,6 +248,7 @@ def run_subject(
         "description": None if run.model is None else run.model.scenario.description,
         "notes": notes,
         "final": [] if run.final is None else trajectory.rows_of(run.final),
+        "joints": _joints(run),
         "comparison": comparison,
         "ledger": _ledger(run),
         "provenance": _provenance(run),
@@ -314,6 +315,16 @@ def _summary(run: PartialRun) -> list[tuple[str, str]]:
         ("solver time", f"{summary.solver_seconds:.2f} s on {summary.threads} thread{'s' * (summary.threads > 1)}"),
         ("relative energy error", "0" if error == 0.0 else f"{error:.1e}" if math.isfinite(error) else "unknown"),
         *(("warning", local_text(warning)) for warning in summary.warnings),
+    ]
+
+
+def _joints(run: PartialRun) -> list[dict[str, Any]]:
+    """Return the joints across structures with their states, and with why there are no active factors."""
+    states = {} if run.summary is None else run.summary.joints
+    return [
+        {"state": state, **row.model_dump(), "why": one.reasons.get(row.structure, "")}
+        for state, one in states.items()
+        for row in one.joints
     ]
 
 
