@@ -6,7 +6,7 @@ degrees: of lower courses, ground, walls, other structures and, below the lowest
 where steeper faces carry more than a hundredth of a cut, as in arches and cells, or once it has fallen.
 
 Moments are about the toe, the end of the joint towards which the resultant leans, or the other end where nothing
-overturns about that one. Weight, the thrust of a soil from one side, a load, and another body that presses from
+overturns about that one. Weight, the pull of a coefficient of gravity along the ground, the thrust of a soil from one side, a load, and another body that presses from
 elsewhere are an item each, and stabilise or not by their own sign.
 """
 
@@ -198,7 +198,9 @@ class _Sides:
         """
         world, bodies, numbers = self.world, self.bodies, dict[int, int]()
         kinds = balance.solver_module("kernels.common.arrays")
-        pulls = {0: np.array([world.controls[0].gravity_x, world.controls[0].gravity_y])}  # m/s2
+        along = self.model.scenario.gravity.magnitude * self.model.scenario.gravity.horizontal
+        pulls = {0: np.array([world.controls[0].gravity_x - along, world.controls[0].gravity_y])}  # m/s2
+        pulls[numbers.setdefault(0, 1)] = np.array([along, 0.0])
         parts: list[tuple[Any, ...]] = []  # item, body, forces, moment about the place, place
         centre = np.stack([bodies["x"], bodies["y"]], axis=-1)
         for load, one in zip(world.loads, (*self.model.acting_loads, *self.model.scenario.actuators), strict=True):
@@ -261,7 +263,7 @@ class _Sides:
             shear = nx * fy - ny * fx  # along the normal turned by +90 degrees
             turned = math.degrees(math.atan2(-math.copysign(1.0, nx) * shear, fx * nx + fy * ny))
             share, table = None, self._soil(soil)
-            weight = self.model.scenario.materials[table.material].density * self.model.scenario.gravity
+            weight = -self.model.scenario.materials[table.material].density * self.model.scenario.gravity.pull(0.0)[1]
             if way < UPRIGHT and weight > 0.0 and (kinds[:, :UPRIGHT] == [on, way]).all(axis=1).sum() == 1:
                 height, depth = self._height(soil, table.spacing, self.place[own, 0]), self.depth[self.body[own[0]]]
                 share = 2.0 * math.hypot(fx, fy) / (weight * height**2 * min(depth, depth_of_scene(self.model)))

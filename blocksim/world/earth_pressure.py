@@ -1,7 +1,8 @@
 """Active thrust of soil on the straight back of a structure, by the wedge of C. A. Coulomb (1776).
 
 As in B. M. Das, Principles of Geotechnical Engineering, section 13.12: general batter, inclination of the surface, and
-friction on the back; of Rankine where all three are zero. Cohesion takes 2 c K^(1/2) off the pressure, and leaves no
+friction on the back; of Rankine where all three are zero, and of N. Mononobe and S. Okabe (the same book, section 14)
+with coefficients of gravity. Cohesion takes 2 c K^(1/2) off the pressure, and leaves no
 tension.
 """
 
@@ -25,15 +26,18 @@ class NotApplicableError(Exception):
     """Why a structure has no joints, or no active thrust."""
 
 
-def coulomb_share(angle: float, batter: float = 0.0, slope: float = 0.0, friction: float = 0.0) -> float:
-    """Return K of the active wedge; all angles in rad, the slope no more than the soil's own angle.
+def coulomb_share(
+    angle: float, batter: float = 0.0, slope: float = 0.0, friction: float = 0.0, pull: float = 0.0
+) -> float:
+    """Return K of the active wedge; all angles in rad, the slope and the pull together no more than the soil's angle.
 
     The batter is positive where the foot of the back is farther in the soil than its head, the slope where the surface
-    rises away from the back.
+    rises away from the back, the pull of gravity where it is turned towards the back.
     """
-    across = math.cos(batter + friction)
-    root = math.sin(angle + friction) * math.sin(max(angle - slope, 0.0)) / (across * math.cos(batter - slope))
-    return math.cos(angle - batter) ** 2 / (math.cos(batter) ** 2 * across * (1.0 + math.sqrt(root)) ** 2)
+    across = math.cos(batter + friction + pull)
+    root = math.sin(angle + friction) * math.sin(max(angle - slope - pull, 0.0)) / (across * math.cos(batter - slope))
+    wedge = math.cos(angle - batter - pull) ** 2 / (math.cos(pull) * math.cos(batter) ** 2)
+    return wedge / (across * (1.0 + math.sqrt(root)) ** 2)
 
 
 class ActiveThrust(NamedTuple):
@@ -68,13 +72,14 @@ def active_thrust(
     Raises NotApplicableError.
     """
     scenario, placed, (x, y) = model.scenario, model.bodies, soil.corners.T
+    along, down = scenario.gravity.pull(0.0)
     near = STRAIGHT * placement.smallest_width(placed[number] for number in own)
     faces = [
         [placed[number].ground_point(*place)[::-1] for place in edge[:2]]
         for number, edge in exposed_faces(scenario, placed, outer, side)
     ]
     back = np.array([face for face in faces if min(face)[0] < y.max()]).reshape(-1, 2)
-    if scenario.ground.tilt != 0.0 or not scenario.gravity > 0.0 or not len(back):
+    if scenario.ground.tilt != 0.0 or not down < 0.0 or not len(back):
         raise NotApplicableError("gravity is not vertical, or nothing is beside the soil")
     lean, base = _line(back, near, "the back")  # x = base + lean y
     begin, far = side * float((side * back[:, 1]).max()), side * float((side * x).max())
@@ -95,12 +100,13 @@ def active_thrust(
     material, block = scenario.materials[soil.material], placed[outer[0]]
     slope, strength = yield_surface(material)
     angle, rising, batter = math.asin(3.0 * slope), math.atan(side * rise), math.atan(-side * lean)
-    if rising > angle or abs(far - begin) < (top - low) * math.tan(math.pi / 4.0 - 0.5 * angle):
+    pull = math.atan2(-side * along, -down)
+    if rising + pull > angle or abs(far - begin) < (top - low) * math.tan(math.pi / 4.0 - 0.5 * angle):
         raise NotApplicableError("the surface is steeper than the friction angle, or ends within the wedge")
     rough = friction_with(scenario, soil.material, block.material, ground=False).static
     friction = min(math.atan(rough), angle)
-    share = coulomb_share(angle, batter, rising, friction)
-    weight, cohesion = material.density * scenario.gravity, strength / math.cos(angle)
+    share = coulomb_share(angle, batter, rising, friction, pull)
+    weight, cohesion = -material.density * down, strength / math.cos(angle)
     return ActiveThrust(side, (low, top), base + lean * top, batter, friction, share, weight, cohesion, block.depth)
 
 

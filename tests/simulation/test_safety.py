@@ -321,3 +321,16 @@ def test_joints_are_a_picture_and_stand_in_the_report(tmp_path: Path) -> None:
         assert math.copysign(1.0, one.inclination_deg) == -math.copysign(1.0, one.fy_N)
     assert on_ground.share is None
     assert on_ground.fy_N == pytest.approx(-20e3 * 0.15 * 0.05 * 0.05, rel=0.05)
+
+
+
+@pytest.mark.parametrize(("angle", "friction", "kh"), [(30.0, 15.0, 0.2), (35.0, 0.0, 0.1), (35.0, 20.0, -0.1)])
+def test_share_of_the_active_wedge_under_coefficients_of_gravity_is_that_of_the_worst_wedge(
+    angle: float, friction: float, kh: float
+) -> None:
+    """Equilibrium of wedges of all angles behind an upright back; half a turn of the force on the plane of each."""
+    phi, delta = math.radians(angle), math.radians(friction)
+    planes = np.linspace(phi + 1e-3, 0.5 * math.pi - 1e-3, 100_001)
+    turned = np.tan(planes - phi)
+    worst = ((turned + kh) / np.tan(planes) / (math.cos(delta) + math.sin(delta) * turned)).max()
+    assert coulomb_share(phi, friction=delta, pull=math.atan(kh)) == pytest.approx(worst, rel=1e-6)

@@ -11,7 +11,7 @@ from blocksim.scenario import GROUND, Model, Scenario
 from blocksim.simulation import Result
 from blocksim.study.static_limit import static_limit
 from blocksim.world.interactions import contact_classes, interactions_of
-from blocksim.world.systems.soil_arrays import interactions_with, kind_records
+from blocksim.world.systems.soil_arrays import interactions_with, build_soils
 from blocksim.world.systems.soils import SOILS
 from tests.soils import DEPTH, column, scene
 from tests.study.plans import SQUAT, block_on_a_slope
@@ -81,7 +81,7 @@ def test_a_factor_divides_what_it_is_of_and_leaves_pressure_at_rest(of: list[str
             for model in (full, reduced)
         )
         np.testing.assert_array_equal(other, one / joints)
-    (record,) = kind_records(reduced)
+    (record,) = build_soils(reduced).kinds
     weaker = math.atan(math.tan(ANGLE) / soil)
     assert (record.slope, record.cohesion) == pytest.approx((math.sin(weaker) / 3.0, 1e3 / soil * math.cos(weaker)))
     np.testing.assert_array_equal(SOILS.elements(full).start, SOILS.elements(reduced).start)
