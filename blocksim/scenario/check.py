@@ -162,8 +162,8 @@ def implausible_values(scenario: Scenario, placed: Sequence[placement.PlacedBody
     for soil in placement.soil_tables(scenario):
         for name, width in islice(start.gaps(soil, scenario, placed), MOST_GAPS):
             warnings.append(
-                f"soil {soil.name}: a gap of {1e3 * width:.3g} mm to {name}, {width / soil.spacing:.2g} spacings; until "
-                "it closes the soil slides and presses less or more than at rest: let the outline begin at that face"
+                f"soil {soil.name}: a gap of {1e3 * width:.3g} mm to {name}, {width / soil.spacing:.2g} spacings; "
+                "until it closes the soil slides, and its thrust is another: let the outline begin at that face"
             )
     loose = overlap.support_warning(scenario, placed)
     return [*warnings, *cut_off(scenario, placed), *([loose] if loose else [])]

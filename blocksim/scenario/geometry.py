@@ -164,7 +164,7 @@ def fill_rows(corners: Floats, spacing: float, obstacles: Sequence[Floats] = ())
 
 
 def _levels(corners: Floats, spacing: float, obstacles: Sequence[Floats]) -> list[float]:
-    """Return heights (m) of the bottom, of level edges that soil lies against, and of the top, apart by some spacings."""
+    """Return heights (m) of the bottom, of level edges beside the soil, and of the top, some spacings apart."""
     levels = [float(begin[1]) for begin, end in _edges(corners) if begin[1] == end[1]]
     for one in obstacles:
         for begin, end in _edges(one):
@@ -207,13 +207,13 @@ def _shadow(corners: Floats, y: float) -> list[float]:
 def _free_parts(crossings: Floats, taken: list[list[float]]) -> Iterator[tuple[float, float]]:
     """Yield the parts (m) of a line inside a polygon, between pairs of crossings, that nothing takes."""
     for begin, end in zip(crossings[::2].tolist(), crossings[1::2].tolist(), strict=True):
+        free = begin
         for first, last in sorted(taken):
-            if begin <= first < end:
-                yield begin, first
-            if first < end:
-                begin = max(begin, last)
-        if begin <= end:
-            yield begin, end
+            if free <= first < end:
+                yield free, first
+            free = max(free, last) if first < end else free
+        if free <= end:
+            yield free, end
 
 
 FEWEST, MOST = 3, 16

@@ -183,7 +183,7 @@ LEVEL = 1.0 - 1e-9  # upward part of the normal of a level face
 
 def gaps(soil: SoilTable, scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[tuple[str, float]]:
     """Yield the names of what soil lies beside but does not reach, with the width (m) of the gap."""
-    from scipy.spatial import cKDTree  # noqa: PLC0415 - it takes a quarter of a second
+    from scipy.spatial import cKDTree
 
     tree, spacing = cKDTree(particle_places(soil, placed)[0]), soil.spacing
     low, high = soil.corners.min(axis=0) - spacing, soil.corners.max(axis=0) + spacing
@@ -210,7 +210,8 @@ def _faces(
     for body in placed:
         corners = np.array([body.ground_point(*corner) for corner in body.corners])
         if np.all(corners.max(axis=0) > low) and np.all(corners.min(axis=0) < high):
-            yield from ((f"block {body.name}", *ends) for ends in zip(corners, np.roll(corners, -1, axis=0), strict=True))
+            for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+                yield f"block {body.name}", begin, end
     segments = placement.place_segments(scenario)
     for number, one in enumerate(segments, start=1 - (len(segments) - len(scenario.walls))):
         begin, along = np.array([one.x1, one.y1]), np.array([one.x0 - one.x1, one.y0 - one.y1])
@@ -311,8 +312,8 @@ def _unfit_tables(scenario: Scenario) -> Iterator[Mistake]:
     """Find vibrations of too many cycles, too many tables, stiffnesses without a law, and masses beyond all numbers."""
     motions: list[tuple[overrides.KeyPath, object]] = [((), scenario.motion)]
     motions += [(("bodies", number), body.motion) for number, body in enumerate(scenario.bodies)]
-    for path, motion in motions:
-        pieces = sum(count for *_, count in motion.sections(scenario.time.end)) if isinstance(motion, Harmonic) else 0
+    for path, one in motions:
+        pieces = sum(count for *_, count in one.sections(scenario.time.end)) if isinstance(one, Harmonic) else 0
         if pieces > MAX_PIECES:
             message = f"{pieces / PIECES_PER_CYCLE:.6g} cycles are too many; at most {MAX_PIECES // PIECES_PER_CYCLE}"
             yield Mistake((*path, "motion", "frequency"), f"{message} are allowed")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common import arrays, compiler, systems
 from blocksim.kernels.common.members import Watched, next_frame
-from blocksim.scenario import Model, PlacedBody, Scenario, motion as motions, placement
+from blocksim.scenario import Model, PlacedBody, Scenario, placement
 from blocksim.simulation import balance, instruments, loop, observables, rest_state, schemes, trajectory
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, OUTCOME, Value, Watch, observe
 from blocksim.world import build

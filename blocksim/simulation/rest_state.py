@@ -25,12 +25,13 @@ meet nothing on the way that is left to them.
 With `start.release = "always"` what does not come to rest begins its run from where it had begun to move, as fast as it
 did.
 
-Beside soil (`_BesideSystems`) blocks come to rest under their weight alone; then they are kept still while the soil comes
-to rest against them, at the pressure of a wall that does not yield; then both go on together. All that with the whole
-gravity and all friction, and kinetic damping of blocks and particles: the peaks are those of the energy of both. The
-energy that is taken away is an entry of the ledger. At rest are particles on which the mean unbalanced force is 1e-3 of
-their weight, and blocks with accelerations of 1e-3 of gravity. Where there is no equilibrium, the run begins with the
-motion of blocks and soil, as with `release = "always"`, or as all was placed where the soil flows beside still blocks.
+Beside soil (`_BesideSystems`) blocks come to rest under their weight alone; then they are kept still while the soil
+comes to rest against them, at the pressure of a wall that does not yield; then both go on together. All that with the
+whole gravity and all friction, and kinetic damping of blocks and particles: the peaks are those of the energy of both.
+The energy that is taken away is an entry of the ledger. At rest are particles on which the mean unbalanced force is
+1e-3 of their weight, and blocks with accelerations of 1e-3 of gravity. Soil that is filled in by lifts goes through all
+that with each of them. Where there is no equilibrium, the run begins with the motion of blocks and soil, as with
+`release = "always"`, or as all was placed where the soil flows beside still blocks, or a lift before the last one.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -42,7 +43,6 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode, StoppedEarlyError
 from blocksim.kernels.common.arrays import LOAD_ACTUATOR, REACHED
-from blocksim.kernels.common.systems import Coupled
 from blocksim.scenario import Model, overlap, placement
 from blocksim.simulation import balance, results, schemes
 from blocksim.world.build import arrays_of
@@ -91,7 +91,7 @@ def initial_scene(
     StoppedEarlyError where `stop` says why.
     """
     scenario, placed = model.scenario, model.bodies
-    if model.settles and (scenario.start.settle or isinstance(scene, Coupled)):
+    if model.settles and (scenario.start.settle or scenario.systems):
         return settle(scene, model, team, stop)
     if not model.settles or any(body.vx or body.vy or body.spin for body in placed):
         return scene, None
@@ -124,7 +124,7 @@ def settle(
 
     Raises SettleError, and StoppedEarlyError where `stop` says why.
     """
-    run = (_BesideSystems if isinstance(scene, Coupled) else _Settlement)(scene, model, team, stop)
+    run = (_BesideSystems if model.scenario.systems else _Settlement)(scene, model, team, stop)
     with run.without_time():
         try:
             run.come_to_rest()
@@ -454,6 +454,8 @@ class _Settlement:
 class _BesideSystems(_Settlement):
     """Blocks and further systems on their way to rest together."""
 
+    scene: Any  # Coupled
+
     def __init__(self, scene: Any, model: Model, team: schemes.Team, stop: Stop) -> None:
         super().__init__(scene, model, team, stop)
         self.is_released = True
@@ -465,11 +467,11 @@ class _BesideSystems(_Settlement):
     @property
     def parts(self) -> list[tuple[Relaxation, Any]]:
         """What each system needs to come to rest, with its arrays."""
-        relaxations = [one.system.relaxation for one in self.others]
-        return [*zip(relaxations, self.scene.systems, strict=True)]  # type: ignore[union-attr, arg-type]
+        own = zip(self.others, self.scene.systems, strict=True)
+        return [(one.system.relaxation, arrays) for one, arrays in own if one.system.relaxation is not None]
 
     def come_to_rest(self) -> None:
-        """Bring blocks to rest alone, then the others beside blocks that are kept still, then all. Raises SettleError."""
+        """Bring blocks to rest alone, then the others beside still blocks, then all. Raises SettleError."""
         as_placed = self.scene, [array.copy() for array in arrays_of(self.scene)]
         if self.is_free.any():
             self._bear_own_weight()
@@ -540,7 +542,7 @@ class _BesideSystems(_Settlement):
             self._go()
 
     def _farthest(self) -> float:
-        own = zip(self.others, self.scene.systems, strict=True)  # type: ignore[union-attr]
+        own = zip(self.others, self.scene.systems, strict=True)
         changes = [one.system.state(arrays, one.count)[:2] - one.elements.start[:2] for one, arrays in own]
         return max([super()._farthest(), *(float(np.nanmax(np.hypot(*change))) for change in changes)])
 

@@ -333,8 +333,8 @@ def _warnings(model: Model, ended: loop.LoopResult, settled: results.RestState |
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     if settled is not None and not settled.at_rest and scenario.systems:
         yield (
-            f"no equilibrium before time zero: block {settled.displaced_block} moves on while the scene settles; the run "
-            f"begins with it {settled.largest_displacement_mm:.3g} mm from its place, as fast as it is there"
+            f"no equilibrium before time zero: block {settled.displaced_block} moves on while the scene settles; "
+            f"the run begins with it {settled.largest_displacement_mm:.3g} mm from its place, as fast as it is there"
         )
     yield from _convergence_warnings(scenario, convergence_of(ended.scene))
     yield from systems.warnings_of(model)

@@ -6,8 +6,8 @@ degrees: of lower courses, ground, walls, other structures and, below the lowest
 where steeper faces carry more than a hundredth of a cut, as in arches and cells, or once it has fallen.
 
 Moments are about the toe, the end of the joint towards which the resultant leans, or the other end where nothing
-overturns about that one. Weight, the pull of a coefficient of gravity along the ground, the thrust of a soil from one side, a load, and another body that presses from
-elsewhere are an item each, and stabilise or not by their own sign.
+overturns about that one. Weight, the pull of a coefficient of gravity along the ground, the thrust of a soil from one
+side, a load, and another body that presses from elsewhere are an item each, and stabilise or not by their own sign.
 """
 
 import math

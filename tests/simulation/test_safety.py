@@ -323,7 +323,6 @@ def test_joints_are_a_picture_and_stand_in_the_report(tmp_path: Path) -> None:
     assert on_ground.fy_N == pytest.approx(-20e3 * 0.15 * 0.05 * 0.05, rel=0.05)
 
 
-
 @pytest.mark.parametrize(("angle", "friction", "kh"), [(30.0, 15.0, 0.2), (35.0, 0.0, 0.1), (35.0, 20.0, -0.1)])
 def test_share_of_the_active_wedge_under_coefficients_of_gravity_is_that_of_the_worst_wedge(
     angle: float, friction: float, kh: float

@@ -75,7 +75,9 @@ def test_wall_that_cannot_hold_its_soil_falls_from_where_it_began_to_move_and_sa
     assert settled.largest_displacement_mm <= 0.02 * 80.0
     assert any(text.startswith("no equilibrium before time zero: block 4 moves on") for text in result.summary.warnings)
     assert result.summary.movement is not None
-    assert result.summary.movement.values["largest_displacement_mm"] > 0.05 * 80.0
+    far = result.summary.movement.values["largest_displacement_mm"]
+    assert isinstance(far, float)
+    assert far > 0.05 * 80.0
 
 
 def test_settled_wall_and_its_mirror_image_are_mirrored() -> None:
@@ -83,7 +85,7 @@ def test_settled_wall_and_its_mirror_image_are_mirrored() -> None:
     for sign in (1, -1):
         simulation = Simulation(scenario_from_mapping(wall(0.16, sign=sign))).advance(to=0.01)
         places.append(np.array([sign * simulation.bodies.x, simulation.bodies.y, sign * simulation.bodies.angle]))
-    np.testing.assert_allclose(*places, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(places[0], places[1], rtol=0.0, atol=1e-9)
 
 
 def test_threads_change_no_bit_of_a_settled_wall() -> None:
@@ -95,7 +97,8 @@ def test_soil_alone_and_soil_beside_fixed_blocks_begin_as_they_are_placed() -> N
     data = wall(0.16)
     assert Model(scenario_from_mapping(data)).settles
     fixed = [{**body, "fixed": True} for body in data["bodies"]]
-    for changes in ({"bodies": fixed}, {"start": {"settle": False}}, {"soils": [{**data["soils"][0], "start": "ramp"}]}):
+    ramp = {**data["soils"][0], "start": "ramp"}
+    for changes in ({"bodies": fixed}, {"start": {"settle": False}}, {"soils": [ramp]}):
         assert not Model(scenario_from_mapping({**data, **changes})).settles
 
 
@@ -107,9 +110,7 @@ def test_soil_alone_and_soil_beside_fixed_blocks_begin_as_they_are_placed() -> N
         ("start", {"hold": ["2"]}, "body 2 is held"),
     ],
 )
-def test_settling_of_what_moves_before_is_refused_with_what_moves(
-    table: str, values: dict[str, Any], why: str
-) -> None:
+def test_settling_of_what_moves_before_is_refused_with_what_moves(table: str, values: dict[str, Any], why: str) -> None:
     data = wall(0.16, start={"settle": True})
     if table == "start":
         data["start"] |= values

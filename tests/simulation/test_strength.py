@@ -11,14 +11,14 @@ from blocksim.scenario import GROUND, Model, Scenario
 from blocksim.simulation import Result
 from blocksim.study.static_limit import static_limit
 from blocksim.world.interactions import contact_classes, interactions_of
-from blocksim.world.systems.soil_arrays import interactions_with, build_soils
+from blocksim.world.systems.soil_arrays import build_soils, interactions_with
 from blocksim.world.systems.soils import SOILS
 from tests.soils import DEPTH, column, scene
 from tests.study.plans import SQUAT, block_on_a_slope
 
 FACTOR = 1.5
 ANGLE = math.radians(20.0)  # of clay
-WALL = {
+WALL: dict[str, Any] = {
     "blocks": {"wall": {"width": 0.04, "height": 0.06, "length": DEPTH, "material": "soft"}},
     "bodies": [{"block": "wall", "x": -0.02, "y": 0.03}],
 }
@@ -62,7 +62,7 @@ def test_a_run_of_soil_with_a_factor_is_that_of_weaker_soil_to_the_bit() -> None
 @pytest.mark.parametrize("of", [["soil"], ["joints"], ["soil", "joints"]])
 def test_a_factor_divides_what_it_is_of_and_leaves_pressure_at_rest(of: list[str]) -> None:
     table = column(0.05, 0.1, 0.005, material="clay")
-    pairs = {"clay": {"soft": {"friction": {"static": 0.4, "kinetic": 0.3}}}}
+    pairs: Any = {"clay": {"soft": {"friction": {"static": 0.4, "kinetic": 0.3}}}}
     full, reduced = (
         Model(scene(table, pairs=pairs, strength=one, **WALL)) for one in ({}, {"factor": FACTOR, "of": of})
     )

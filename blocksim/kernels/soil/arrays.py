@@ -1,8 +1,9 @@
 """The arrays of all soils of a scene, with unit and sign of every field; SI units.
 
 `n` particles of one spacing s stand for prisms of s x s and the depth of the scene out of the plane, so that masses,
-forces and energies are those of blocks; where a soil is stretched to fill its outline, of what each has of its area. Stresses are positive in tension. Particles are kept in the order of their
-cells; `number` names them for whoever looks from outside.
+forces and energies are those of blocks; of the areas that they share out where rows are stretched to fill an outline.
+Stresses are positive in tension. Particles are kept in the order of their cells; `number` names them for whoever looks
+from outside.
 
 Losses are tallied by groups of particles, in their order, so that the bits of a sum depend on no number of threads.
 Four particles in a row, a cluster, share one list of neighbours; see neighbours.py.
@@ -58,7 +59,8 @@ TALLY = record_type(
     "fastest",  # m/s: highest speed in the current drift
 )
 CONTROLS = record_type(
-    "area volume smoothing reach skin "  # m2, m3, m, m, m: of a particle of the first kind; h; support; lists reach so far on
+    "area volume "  # m2, m3: of a particle of the first kind
+    "smoothing reach skin "  # m, m, m: h; support radius; how much farther lists reach
     "travel "  # m: no particle or body has moved farther since the lists were made
     "radius "  # m: of the disc that touches bodies
     "viscosity ramp "  # -, s: factor of artificial viscosity; until when gravity grows

@@ -4,7 +4,7 @@ Velocity Verlet as for bodies; at the start, while gravity grows or contacts fin
 
 Velocity gradients from neighbours, raw or corrected.
 
-With d = r_j - r_i, V the area of a particle of the first kind and f = -W'/r > 0, so that grad_i W_ij = f d, the gradient is
+With d = r_j - r_i, V the area of a particle of the first kind, f = -W'/r > 0 and grad_i W_ij = f d, the gradient is
 
     L = sum V (v_j - v_i) (x) f d B,    B = 1 (raw) or M^-1 with M = sum V f d (x) d (corrected; J. Bonet and
     T.-S. L. Lok, Comput. Methods Appl. Mech. Eng. 180 (1999) 97-115),

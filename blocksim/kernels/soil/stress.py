@@ -201,9 +201,7 @@ def row_beside(
 
 
 @jit.rare_kernel
-def shares_of_place(
-    world: arrays.World, x: float, y: float, radius: float, kind: arrays.Record
-) -> tuple[float, float]:
+def shares_of_place(world: arrays.World, x: float, y: float, radius: float, kind: arrays.Record) -> tuple[float, float]:
     """Return the stresses across upright and level faces at a place (m) over those far from all faces.
 
     Of faces to the same side, such as those of blocks on one another, the nearest counts.

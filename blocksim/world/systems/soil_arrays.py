@@ -37,7 +37,7 @@ def with_lift(model: Model, before: arrays.Soils | None, count: int) -> arrays.S
     after.points[place], after.states[place] = before.points, before.states
     for name in ("touches", "kept"):
         getattr(after, name)[: getattr(before, name).size] = getattr(before, name)
-    for name in before.tallies.dtype.names:
+    for name in before.tallies.dtype.names or ():
         after.tallies[name][0] = before.tallies[name].sum()
     after.controls["touch_count"] = before.controls["touch_count"]
     after.controls["is_listed"], after.controls["travel"] = 1, np.inf  # new lists, without another start
