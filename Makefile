@@ -166,6 +166,10 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the findings in results/
 	$(BLOCKSIM) plot $(PICTURES)/arch --experiment scenarios/published/arch_thickness.csv --out results/arch_thickness.png
 	$(BLOCKSIM) run scenarios/soil/retaining_wall_falls.toml --quiet
 	$(BLOCKSIM) plot scenarios/soil/retaining_wall_falls.toml --out results/retaining_wall.png
+	mkdir -p $(PICTURES) && rm -f $(PICTURES)/my_retaining_wall.toml
+	cd $(PICTURES) && $(abspath $(BLOCKSIM)) new retaining-wall my_retaining_wall --quiet > /dev/null
+	$(BLOCKSIM) run $(PICTURES)/my_retaining_wall.toml --out $(PICTURES)/retaining_joints --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/retaining_joints --kind joints --out results/retaining_joints.png
 	$(BLOCKSIM) limit scenarios/tilting_wall.toml --vary ground.tilt=20deg:40deg --stands "outcome != fell" \
 	    --out $(PICTURES)/tilting_wall --overwrite --quiet
 	$(BLOCKSIM) plot $(PICTURES)/tilting_wall --kind mechanism --out results/tilting_wall.png

@@ -32,7 +32,7 @@ def test_a_new_scenario_passes_the_check(blocksim: Command, kind: str) -> None:
 COMMENTED = {
     "wall": ("missing", "shear_velocity"),
     "voronoi": ("smallest",),
-    "retaining-wall": ("cohesion", "start"),
+    "retaining-wall": ("cohesion", "lifts"),
     "soil-slope": ("cohesion",),
     "sweep-grid": ('"contact.stiffness_scale"',),
     "sweep-sobol": ('"contact.stiffness_scale"',),
