@@ -197,7 +197,8 @@ def gaps(soil: SoilTable, scenario: Scenario, placed: Sequence[PlacedBody]) -> I
         is_soil = geometry.is_inside(beside, soil.corners)
         for corners in blocks:
             is_soil &= geometry.height_above(corners, beside) == 0.0
-        apart = tree.query(places[is_soil])[0] - 0.5 * spacing if is_soil.any() else np.zeros(0)
+        nearest = tree.data[tree.query(places[is_soil])[1]] if is_soil.any() else places[is_soil]
+        apart = (nearest - places[is_soil]) @ out - 0.5 * spacing
         wide = apart[apart > (WIDEST_BELOW if 0.5 < abs(out[1]) < LEVEL else WIDEST_GAP) * spacing]
         if len(wide) > 2.0 * GAP_LENGTH:
             yield name, float(np.median(wide))

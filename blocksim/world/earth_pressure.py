@@ -125,4 +125,4 @@ def _heights(corners: Floats, places: Floats) -> tuple[Floats, Floats]:
     with np.errstate(divide="ignore", invalid="ignore"):
         share = (places - x0) / (x1 - x0)
     y = np.where((share >= 0.0) & (share <= 1.0), y0 + np.clip(np.nan_to_num(share), 0.0, 1.0) * (y1 - y0), math.nan)
-    return np.nanmin(y, axis=0), np.nanmax(y, axis=0)
+    return np.fmin.reduce(y, axis=0), np.fmax.reduce(y, axis=0)  # nan where it has nothing

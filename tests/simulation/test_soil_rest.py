@@ -10,7 +10,8 @@ from blocksim.errors import ScenarioError
 from blocksim.scenario import Model, scenario_from_mapping
 from blocksim.simulation import schemes, simulate
 from blocksim.simulation.loop import Simulation
-from blocksim.world.systems.soils import body_contacts
+from blocksim.world.describe import describe
+from blocksim.world.systems.soils import body_contacts, in_lifts
 from tests.soils import DEPTH, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, column, data_of, right
 
 HEIGHT, COUNT, LENGTH = 0.32, 4, 0.35  # m, blocks, m of soil behind
@@ -142,3 +143,29 @@ def test_pressure_at_rest_on_fixed_smooth_walls_is_that_of_elasticity_and_the_su
     assert own.max() + 0.5 * SPACING == pytest.approx(height, abs=1e-3 * height)
     mass = schemes.system_totals(scene)[1]
     assert mass == pytest.approx(UNIT_WEIGHT / 9.81 * width * height * DEPTH, rel=1e-12)
+
+
+def test_lifts_begin_with_their_own_weight_and_end_with_all_soil() -> None:
+    data = wall(0.16)
+    data["soils"][0]["lifts"] = 4
+    model = Model(scenario_from_mapping(data))
+    elements, chosen = in_lifts(model, 2)
+    y, stress = elements.start[1, chosen], elements.start[5, chosen]
+    np.testing.assert_allclose(stress, -UNIT_WEIGHT * (0.5 * HEIGHT - y))
+    simulation = Simulation(model)
+    settled, scene = simulation.settled, simulation.scene
+    assert settled is not None
+    assert settled.at_rest
+    assert settled.energy_error is not None
+    assert settled.energy_error < 1e-3
+    mass = schemes.system_totals(scene)[1]
+    assert mass == pytest.approx(UNIT_WEIGHT / 9.81 * LENGTH * HEIGHT * DEPTH)
+    assert RANKINE < -thrust_on(simulation) < REST
+
+
+def test_springs_into_which_the_wall_sinks_are_warned_of_with_a_stiff_enough_scale() -> None:
+    soft = {**wall(0.16), "contact": {"stiffness_scale": 0.1}}
+    (text,) = [one for one in describe(Model(scenario_from_mapping(soft))).warnings if "sinks" in one]
+    assert text.startswith("block 1 sinks")
+    soft["contact"] = {"stiffness_scale": float(text.split("stiffness_scale = ")[1].split()[0])}
+    assert not [one for one in describe(Model(scenario_from_mapping(soft))).warnings if "sinks" in one]

@@ -9,7 +9,8 @@ import pytest
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Model, geometry, placement, scenario_from_mapping, scenario_to_toml, start
 from blocksim.scenario.models.soil import SoilTable
-from tests.soils import MATERIALS, column, data_of, scene
+from blocksim.world.systems import others_of
+from tests.soils import DEPTH, GRAVITY, MATERIALS, UNIT_WEIGHT, column, data_of, scene
 
 SLOPE = {**column(0.3, 0.1, 0.005), "kind": "slope", "angle": "45 deg"}
 
@@ -78,3 +79,24 @@ def test_fill_without_room_for_a_particle_says_so() -> None:
     data["soils"][0]["x"] = [0.0, 0.1]
     with pytest.raises(ScenarioError, match="soil fill meets blocks everywhere: no particle has room"):
         scenario_from_mapping(data)
+
+
+def test_rows_fill_an_outline_that_the_spacing_does_not_divide() -> None:
+    scenario = scene(column(0.103, 0.048, 0.005))
+    (elements,) = [one.elements for one in others_of(Model(scenario))]
+    x, y = elements.start[:2]
+    assert [x.min(), x.max(), y.min(), y.max()] == pytest.approx([0.0025, 0.1005, 0.0025, 0.0455])
+    assert elements.constants[0].sum() == pytest.approx(UNIT_WEIGHT / GRAVITY * 0.103 * 0.048 * DEPTH)
+
+
+def test_gap_to_a_block_is_named_with_its_width() -> None:
+    block = {"wall": {"width": 0.04, "height": 0.06, "length": DEPTH, "material": "soft"}}
+    for gap, named in ((0.0, []), (0.001, []), (0.0025, [("block 1", 0.0025)])):
+        scenario = scene(
+            column(0.1, 0.05, 0.005), blocks=block, bodies=[{"block": "wall", "x": -0.02 - gap, "y": 0.03}]
+        )
+        (soil,) = placement.soil_tables(scenario)
+        found = [*start.gaps(soil, scenario, Model(scenario).bodies)]
+        assert [(name, round(width, 9)) for name, width in found] == named
+        warned = [text for text in Model(scenario).implausible_values if "gap" in text]
+        assert len(warned) == len(named)
