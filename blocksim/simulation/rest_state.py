@@ -560,12 +560,12 @@ class _BesideSystems(_Settlement):
         return max([blocks, *(one.unrest(arrays, self.scene.world) for one, arrays in self.parts)])
 
     def books(self) -> dict[str, float]:
-        """Return the energy (J) that damping took, and the residual over the energy in play."""
+        """Return the energy (J) that damping took, and the residual of the ledger over that."""
         if self.leaving:
             return {}
         ledger = balance.energy_ledger(self.scene, self.initial - self.taken)
         damped = self.taken + float((ledger.model_extra or {}).get("soils_settling", 0.0))
-        return {"damping_J": damped, "energy_error": abs(ledger.residual) / max(ledger.in_play, damped)}
+        return {"damping_J": damped, "energy_error": abs(ledger.residual) / (damped or 1.0)}
 
     def begin(self) -> None:
         """Make this time zero, for all systems."""

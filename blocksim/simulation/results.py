@@ -34,7 +34,7 @@ class RestState(BaseModel, frozen=True):
     held: tuple[str, ...] = ()
     at_rest: bool = True  # False where it was released all the same (`start.release`, soil without an equilibrium)
     damping_J: float | None = None  # noqa: N815 - beside soil: energy that damping took away meanwhile
-    energy_error: float | None = None  # the same: residual of the ledger meanwhile, over the energy in play
+    energy_error: float | None = None  # the same: residual of the ledger meanwhile, over that energy
 
 
 class EventRecord(BaseModel, frozen=True):

@@ -65,7 +65,7 @@ def test_wall_beside_soil_begins_at_rest_between_the_active_thrust_and_that_at_r
     assert settled.damping_J is not None
     assert settled.energy_error is not None
     assert settled.damping_J > 0.0
-    assert settled.energy_error < 1e-3
+    assert settled.energy_error < 5e-3
 
 
 def test_wall_that_cannot_hold_its_soil_falls_from_where_it_began_to_move_and_says_so() -> None:
@@ -157,7 +157,7 @@ def test_lifts_begin_with_their_own_weight_and_end_with_all_soil() -> None:
     assert settled is not None
     assert settled.at_rest
     assert settled.energy_error is not None
-    assert settled.energy_error < 1e-3
+    assert settled.energy_error < 5e-3
     mass = schemes.system_totals(scene)[1]
     assert mass == pytest.approx(UNIT_WEIGHT / 9.81 * LENGTH * HEIGHT * DEPTH)
     assert RANKINE < -thrust_on(simulation) < REST
