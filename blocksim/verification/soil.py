@@ -488,7 +488,7 @@ ROUGH_BASE = {
 }
 SLIPS = {
     "surface": "as S2: the finer the particles, the more the sand slips in bands, whose wedge has K = 0.455 at 10° and "
-    "0.546 at 20°. There 2.5 mm come to 3 % more than that, on the safe side"
+    "0.546 at 20°. K lies between that and the one of a single wedge, on the safe side"
 }
 SHORT = {
     "surface": "an error of first order in the spacing, as the rows with 5, 2.5 and 1.25 mm show. A last bit more or "
