@@ -310,7 +310,7 @@ def test_particle_that_nearly_touches_a_body_at_the_start_is_pressed_against_it(
         touches=[touch],
         points=[record(x=0.0, y=1.0)],
         states=[record(kind=0, sxx=-1.0, sxy=0.0, syy=-1.0)],
-        kinds=[record(density=1.0, volume=1.0)],
+        kinds=[record(density=1.0, volume=1.0, pitch_x=2.0, pitch_y=2.0)],
         interactions=table,
     )
     bodies = type("Rows", (list,), {"size": 1})([ground])
