@@ -98,7 +98,7 @@ def active_thrust(
     if any(one[:, 0].min() < ends[1] and one[:, 0].max() > ends[0] for one in among):
         raise NotApplicableError("other soils or blocks are in the soil or on it")
     material, block = scenario.materials[soil.material], placed[outer[0]]
-    slope, strength = yield_surface(material)
+    slope, strength = yield_surface(material, scenario.strength.divisor("soil"))
     angle, rising, batter = math.asin(3.0 * slope), math.atan(side * rise), math.atan(-side * lean)
     pull = math.atan2(-side * along, -down)
     if rising + pull > angle or abs(far - begin) < (top - low) * math.tan(math.pi / 4.0 - 0.5 * angle):

@@ -333,3 +333,12 @@ def test_share_of_the_active_wedge_under_coefficients_of_gravity_is_that_of_the_
     turned = np.tan(planes - phi)
     worst = ((turned + kh) / np.tan(planes) / (math.cos(delta) + math.sin(delta) * turned)).max()
     assert coulomb_share(phi, friction=delta, pull=math.atan(kh)) == pytest.approx(worst, rel=1e-6)
+
+
+def test_active_thrust_under_a_strength_factor_is_that_of_the_weaker_soil() -> None:
+    weaker = math.degrees(math.atan(math.tan(math.radians(21.9)) / 1.3))
+    found = []
+    for changes in ({"strength.factor": 1.3}, {"materials.rods.friction_angle": f"{weaker!r} deg"}):
+        model = Model(load(SOIL, {**changes, "pairs.rods.aluminium.friction": 0.0}))
+        found.append(active_thrust(model, [0, 1], [0, 1], model.soils[0], 1.0).above(np.zeros(1)))
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
