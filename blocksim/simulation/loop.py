@@ -22,7 +22,7 @@ from blocksim.kernels.common.loads import value_at
 from blocksim.scenario import Model, PlacedBody, Source, events
 from blocksim.scenario.models.timeline import Event
 from blocksim.simulation import balance, checkpoint, instruments, observables, results, safety, schemes, trajectory
-from blocksim.simulation.rest_state import initial_scene
+from blocksim.simulation.rest_state import ACCELERATIONS, VELOCITIES, initial_scene
 from blocksim.world import systems
 
 if TYPE_CHECKING:
@@ -30,11 +30,9 @@ if TYPE_CHECKING:
 
 NEVER = np.iinfo(np.int64).max
 NOT_THERE = {"mass", "inertia", "inverse_mass", "inverse_inertia"}
-RATES = ("vx", "vy", "spin")
-ACCELERATIONS = ("ax", "ay", "spin_rate")
 OF_CONTACTS = ("fx", "fy", "torque", "pairs_now", "pairs_before", "pairs_changed")
 OF_PIECES = ("seats", "coming", "is_asked", "sums_changed")  # see kernels/explicit/inertia.py
-OF_FREE_BODIES = (*NOT_THERE, *RATES, *ACCELERATIONS, *OF_CONTACTS, *OF_PIECES)  # mass, motion and forces
+OF_FREE_BODIES = (*NOT_THERE, *VELOCITIES, *ACCELERATIONS, *OF_CONTACTS, *OF_PIECES)  # mass, motion and forces
 
 
 class SteppingError(BlocksimError):
@@ -138,7 +136,7 @@ class Timeline:
             controls.loads_end = world.load_pieces["start"][world.loads["last_piece"] - 1].max()
         if event.velocity is not None:
             body = world.bodies[self.names[event.velocity.body]]
-            for rate in RATES if body.inverse_mass > 0.0 else ():
+            for rate in VELOCITIES if body.inverse_mass > 0.0 else ():
                 if (value := getattr(event.velocity, rate)) is not None:
                     body[rate] = value
         return world if isinstance(scene, arrays.World) else scene._replace(world=world)
